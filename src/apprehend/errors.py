@@ -1,0 +1,57 @@
+"""The one tree of exceptions. A caller's mistake raises one of these; a numerical outcome never does.
+
+Every message is built from facts: what was given, where it stood, what is allowed, and what to do next.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Never
+
+
+class ApprehendError(Exception):
+    """Base of every exception that this package raises on purpose."""
+
+    def __str__(self) -> str:  # KeyError would print its message quoted
+        return str(self.args[0]) if self.args else ""
+
+
+class InputError(ApprehendError, ValueError):
+    """An argument has a wrong shape, unit, range or value."""
+
+
+class UnknownNameError(ApprehendError, KeyError):
+    """A name (robot, frame, joint, body, option) does not exist."""
+
+
+class DescriptionError(ApprehendError, ValueError):
+    """A robot, hand or scene description cannot be read as it stands."""
+
+
+class MeshError(ApprehendError, ValueError):
+    """A mesh file is missing, unreadable, or not usable as a body."""
+
+
+class MissingDependencyError(ApprehendError, ImportError):
+    """An optional dependency is needed for this call."""
+
+
+class UnsuccessfulError(ApprehendError, RuntimeError):
+    """Raised by ``Result.require_success()``: the computation answered, but not with a success."""
+
+
+def suggestion(name: str, known: Iterable[str], limit: int = 3) -> str:
+    """``" Did you mean 'a' or 'b'?"`` for close matches of *name* among *known*, else an empty string."""
+    close = difflib.get_close_matches(name, list(known), n=limit, cutoff=0.6)
+    return f" Did you mean {' or '.join(repr(c) for c in close)}?" if close else ""
+
+
+def unknown_name(kind: str, name: str, known: Iterable[str], where: str = "") -> Never:
+    """Raise `UnknownNameError` for *name*, listing what is close, or everything that is there."""
+    names = sorted(known)
+    hint = suggestion(name, names)
+    if not hint:
+        shown = ", ".join(names[:12]) + (f", … ({len(names)} in all)" if len(names) > 12 else "")
+        hint = f" There are: {shown}." if names else " There are none."
+    raise UnknownNameError(f"no {kind} named {name!r}{' in ' + where if where else ''}.{hint}")

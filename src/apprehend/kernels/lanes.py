@@ -1,0 +1,100 @@
+"""Lanes: blocks of independent problems laid out so that the innermost loop is one vector instruction.
+
+A lane array has shape ``(blocks, components, LANES)``: lane ``l`` of block ``b`` belongs to problem
+``b * LANES + l``. The last block is padded with copies of problem 0, so that its arithmetic stays ordinary.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ._jit import kernel
+
+LANES = 16
+"""Problems per block: two AVX-512 or four AVX2 registers of float64, measured best on both."""
+
+
+@kernel(inline=True)
+def sincos(x):  # type: ignore[no-untyped-def]
+    """Sine and cosine without branches: Cody–Waite reduction to [−π/4, π/4] and minimax polynomials.
+
+    The error is below 2 ulp of 1 for |x| ≤ 1e5, which covers joint angles; it vectorises over lanes.
+    """
+    k = math.floor(x * 0.6366197723675814 + 0.5)
+    r = x - k * 1.5707963267341256
+    r = r - k * 6.077100506303966e-11
+    r = r - k * 2.0222662487959506e-21
+    z = r * r
+    s = r + r * z * (
+        -1.66666666666666324348e-01
+        + z
+        * (
+            8.33333333332248946124e-03
+            + z
+            * (
+                -1.98412698298579493134e-04
+                + z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10))
+            )
+        )
+    )
+    c = (
+        1.0
+        - 0.5 * z
+        + z
+        * z
+        * (
+            4.16666666666666019037e-02
+            + z
+            * (
+                -1.38888888888741095749e-03
+                + z
+                * (
+                    2.48015872894767294178e-05
+                    + z * (-2.75573143513906633035e-07 + z * (2.08757232129817482790e-09 - z * 1.13596475577881948265e-11))
+                )
+            )
+        )
+    )
+    quadrant = k - 4.0 * math.floor(k * 0.25)
+    odd = quadrant - 2.0 * math.floor(quadrant * 0.5)
+    sign_s = 1.0 - 2.0 * math.floor(quadrant * 0.5)
+    half = math.floor((quadrant + 1.0) * 0.5)
+    sign_c = 1.0 - 2.0 * (half - 2.0 * math.floor(half * 0.5))
+    return (c * odd + s * (1.0 - odd)) * sign_s, (s * odd + c * (1.0 - odd)) * sign_c
+
+
+@kernel
+def pack(problems, out):  # type: ignore[no-untyped-def]
+    """Lay ``problems (N, m)`` out as lanes ``out (ceil(N / LANES), m, LANES)``; padding repeats problem 0."""
+    count, m = problems.shape
+    for b in range(out.shape[0]):
+        for lane in range(LANES):
+            i = b * LANES + lane
+            if i >= count:
+                i = 0
+            for j in range(m):
+                out[b, j, lane] = problems[i, j]
+
+
+@kernel
+def unpack(lanes, out):  # type: ignore[no-untyped-def]
+    """Inverse of `pack` without the padding: ``lanes (B, m, LANES)`` into ``out (N, m)``."""
+    count, m = out.shape
+    for i in range(count):
+        for j in range(m):
+            out[i, j] = lanes[i // LANES, j, i % LANES]
+
+
+def blocks(count: int) -> int:
+    """Number of blocks that hold *count* problems."""
+    return -(-count // LANES)
+
+
+def to_lanes(problems: np.ndarray) -> np.ndarray:
+    """``(N, m)`` to lanes ``(blocks, m, LANES)``."""
+    out = np.empty((blocks(problems.shape[0]), problems.shape[1], LANES))
+    if problems.shape[0]:
+        pack(problems, out)
+    return out
