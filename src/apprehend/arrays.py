@@ -25,7 +25,7 @@ ROTATION_TOLERANCE = 1e-6
 def as_array(value: ArrayLike, name: str, *, finite: bool = True) -> Array:
     """*value* as a C-contiguous float64 array; NaN and inf are refused unless *finite* is False."""
     try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
+        array = np.asarray(value, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} must be numbers in a rectangular array; {error}") from error
     if finite and not np.isfinite(array).all():
