@@ -1,7 +1,7 @@
 """The one way to compile: every kernel of this package is decorated with `kernel`.
 
 Numba reuses cached machine code of a kernel even when another kernel that it calls has changed. The cache directory
-is therefore keyed by a digest of all kernel sources: any edit starts a fresh directory. `error_model="numpy"` lets
+of a file of kernels is therefore keyed by a digest of that file and all that it imports: an edit starts fresh ones. `error_model="numpy"` lets
 divisions vectorise, and the fast-math flags leave NaN and infinity meaning what they should.
 """
 
@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import TypeVar, cast
 
@@ -35,17 +37,30 @@ def _cache_root() -> Path:
     return base / "apprehend"
 
 
-def _digest() -> str:
-    here = Path(__file__).parent
-    state = hashlib.sha256()
-    for path in sorted(here.rglob("*.py")):
-        state.update(path.relative_to(here).as_posix().encode())
-        state.update(path.read_bytes())
-    state.update(numba.__version__.encode())
-    return state.hexdigest()[:16]
+HERE = Path(__file__).parent
+_IMPORT = re.compile(r"^\s*from \.(\w*) import (.+)$", re.MULTILINE)
 
 
-CACHE_DIR = _cache_root() / "kernels" / _digest()
+@cache
+def _sources(path: Path) -> frozenset[Path]:
+    """The kernel file *path* and every kernel file that it imports, directly or not."""
+    found = {path}
+    for module, names in _IMPORT.findall(path.read_text()):
+        for name in (module,) if module else re.findall(r"\w+", names):
+            other = HERE / f"{name}.py"
+            if other.exists() and other not in found and other != path:
+                found |= _sources(other)
+    return frozenset(found)
+
+
+@cache
+def cache_dir(path: Path) -> Path:
+    """Where the machine code of the kernels in *path* is kept: keyed by all the sources that it is made from."""
+    state = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(_sources(path) | {Path(__file__)}):
+        state.update(source.name.encode())
+        state.update(source.read_bytes())
+    return _cache_root() / "kernels" / f"{path.stem}-{state.hexdigest()[:16]}"
 
 
 def kernel(function: F | None = None, *, inline: bool = False, fast: bool = True) -> F | Callable[[F], F]:
@@ -57,7 +72,7 @@ def kernel(function: F | None = None, *, inline: bool = False, fast: bool = True
 
     def wrap(f: F) -> F:
         before = config.CACHE_DIR
-        config.CACHE_DIR = str(CACHE_DIR)
+        config.CACHE_DIR = str(cache_dir(Path(f.__code__.co_filename)))
         try:
             compiled = numba.njit(
                 cache=True,
