@@ -38,7 +38,7 @@ def _cache_root() -> Path:
 
 
 HERE = Path(__file__).parent
-_IMPORT = re.compile(r"^\s*from \.(\w*) import (.+)$", re.MULTILINE)
+_IMPORT = re.compile(r"^\s*from (?:apprehend\.kernels)?\.(\w*) import (\([^)]*\)|.+)$", re.MULTILINE)
 
 
 @cache
