@@ -14,14 +14,12 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any
 
 import numba
 from numba.core import config
 
 FAST = {"reassoc", "contract", "arcp", "nsz"}
-
-F = TypeVar("F", bound=Callable[..., object])
 
 
 def _cache_root() -> Path:
@@ -63,14 +61,14 @@ def cache_dir(path: Path) -> Path:
     return _cache_root() / "kernels" / f"{path.stem}-{state.hexdigest()[:16]}"
 
 
-def kernel(function: F | None = None, *, inline: bool = False, fast: bool = True) -> F | Callable[[F], F]:
+def kernel(function: Callable[..., object] | None = None, *, inline: bool = False, fast: bool = True) -> Any:
     """Compile *function* lazily with Numba, cached on disk, releasing the GIL.
 
     *inline* splices the body into its callers (for small helpers in lane loops); *fast* = False keeps strict IEEE
     order of operations (for code whose last bits matter, such as exp and log near their edges).
     """
 
-    def wrap(f: F) -> F:
+    def wrap(f: Callable[..., object]) -> Any:
         before = config.CACHE_DIR
         config.CACHE_DIR = str(cache_dir(Path(f.__code__.co_filename)))
         try:
@@ -83,6 +81,6 @@ def kernel(function: F | None = None, *, inline: bool = False, fast: bool = True
             )(f)
         finally:
             config.CACHE_DIR = before
-        return cast(F, compiled)
+        return compiled
 
     return wrap if function is None else wrap(function)
