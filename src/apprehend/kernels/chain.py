@@ -1,0 +1,424 @@
+"""Kernels on one serial chain, from the root of a robot to one of its frames: pose and Jacobian, on lanes.
+
+`ChainModel` is what a kernel sees of a chain. Fixed joints are merged away, the placement of the base is merged into
+the first row of ``place``, and every moving joint has its own frame, turned so that the joint's axis is z. With m
+moving joints and k coordinates that move the frame:
+
+=============  ===========  ========================================================================================
+field          shape        meaning
+=============  ===========  ========================================================================================
+``kind``       (m,) int64   0 revolute (or continuous), 1 prismatic, in order root → frame
+``coordinate`` (m,) int64   index into the robot's joint vector q (n,)
+``column``     (m,) int64   index into ``free``: the column of the chain's own Jacobian (6, k)
+``gain``       (m, 2)       multiplier, offset: the joint's value is ``multiplier * q[coordinate] + offset``
+``place``      (m + 1, 12)  rotation (row-major, 9) and translation (3): row i places the frame of joint i, at value 0,
+                            in the moved frame of joint i − 1 (row 0: in the world); row m places the chain's end
+                            in the moved frame of the last joint
+``free``       (k,) int64   the coordinates that move the frame, ascending
+=============  ===========  ========================================================================================
+
+Joints that mimic appear as joints of their own with the driver's ``coordinate`` and ``column``.
+
+Block kernels work on flat lane buffers: component c of lane l is at ``c * LANES + l``. A pose has 12 components
+(rotation row-major, translation), the axes of joint i six (point on the axis, direction) from ``6 * i``, and
+column c of a Jacobian six (linear, angular) from ``6 * c``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ._jit import kernel
+from .lanes import LANES, sincos
+
+REVOLUTE = 0
+PRISMATIC = 1
+
+SPATIAL = 0
+BODY = 1
+MIXED = 2
+
+SINCOS_RANGE = 1e5
+
+
+class ChainModel(NamedTuple):
+    """Arrays of one chain; see the head of this module."""
+
+    kind: np.ndarray
+    coordinate: np.ndarray
+    column: np.ndarray
+    gain: np.ndarray
+    place: np.ndarray
+    free: np.ndarray
+
+
+@kernel
+def load_block(q, first, count, out):
+    """Rows ``first … first + LANES`` of ``q (N, n)`` into lanes ``out (n * LANES)``; past *count*, the last row again.
+
+    Returns the first row that holds a NaN or an infinity, or −1.
+    """
+    n = q.shape[1]
+    total = 0.0
+    for lane in range(LANES):
+        row = min(first + lane, count - 1)
+        for j in range(n):
+            out[j * LANES + lane] = q[row, j]
+            total += q[row, j] * 0.0
+    if total == 0.0:
+        return -1
+    for row in range(first, min(first + LANES, count)):
+        for j in range(n):
+            if not math.isfinite(q[row, j]):
+                return row
+    return -1
+
+
+@kernel
+def wrap_large(value):
+    """Bring lanes outside the range of `sincos` back by whole turns."""
+    for lane in range(value.shape[0]):
+        if abs(value[lane]) > SINCOS_RANGE:
+            value[lane] = math.atan2(math.sin(value[lane]), math.cos(value[lane]))
+
+
+@kernel
+def joint_value_block(q, coordinate, multiplier, offset, revolute, value):
+    """Values of one joint on the lanes of ``q (n * LANES)``; angles are kept within the range of `sincos`."""
+    start = coordinate * LANES
+    largest = 0.0
+    for lane in range(LANES):
+        v = multiplier * q[start + lane] + offset
+        value[lane] = v
+        largest = max(largest, abs(v))
+    if revolute and largest > SINCOS_RANGE:
+        wrap_large(value)
+
+
+@kernel
+def revolve_block(place, i, value, pose, axes):
+    """Move ``pose (12 * LANES)`` through ``place[i]`` and a rotation by *value* about z; joint i's axis into *axes*."""
+    L = LANES
+    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
+    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
+    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
+    x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    for lane in range(L):
+        s, c = sincos(value[lane])
+        for k in range(3):
+            a0 = pose[3 * k * L + lane]
+            a1 = pose[(3 * k + 1) * L + lane]
+            a2 = pose[(3 * k + 2) * L + lane]
+            b0 = a0 * r00 + a1 * r10 + a2 * r20
+            b1 = a0 * r01 + a1 * r11 + a2 * r21
+            b2 = a0 * r02 + a1 * r12 + a2 * r22
+            p = pose[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
+            pose[3 * k * L + lane] = b0 * c + b1 * s
+            pose[(3 * k + 1) * L + lane] = b1 * c - b0 * s
+            pose[(3 * k + 2) * L + lane] = b2
+            pose[(9 + k) * L + lane] = p
+            axes[(6 * i + k) * L + lane] = p
+            axes[(6 * i + 3 + k) * L + lane] = b2
+
+
+@kernel
+def slide_block(place, i, value, pose, axes):
+    """As `revolve_block`, for a translation by *value* along z."""
+    L = LANES
+    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
+    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
+    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
+    x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    for lane in range(L):
+        d = value[lane]
+        for k in range(3):
+            a0 = pose[3 * k * L + lane]
+            a1 = pose[(3 * k + 1) * L + lane]
+            a2 = pose[(3 * k + 2) * L + lane]
+            b2 = a0 * r02 + a1 * r12 + a2 * r22
+            p = pose[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z + b2 * d
+            pose[3 * k * L + lane] = a0 * r00 + a1 * r10 + a2 * r20
+            pose[(3 * k + 1) * L + lane] = a0 * r01 + a1 * r11 + a2 * r21
+            pose[(3 * k + 2) * L + lane] = b2
+            pose[(9 + k) * L + lane] = p
+            axes[(6 * i + k) * L + lane] = p
+            axes[(6 * i + 3 + k) * L + lane] = b2
+
+
+@kernel
+def place_block(place, i, pose):
+    """Multiply ``pose (12 * LANES)`` by the constant transform ``place[i]`` from the right."""
+    L = LANES
+    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
+    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
+    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
+    x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    for lane in range(L):
+        for k in range(3):
+            a0 = pose[3 * k * L + lane]
+            a1 = pose[(3 * k + 1) * L + lane]
+            a2 = pose[(3 * k + 2) * L + lane]
+            pose[3 * k * L + lane] = a0 * r00 + a1 * r10 + a2 * r20
+            pose[(3 * k + 1) * L + lane] = a0 * r01 + a1 * r11 + a2 * r21
+            pose[(3 * k + 2) * L + lane] = a0 * r02 + a1 * r12 + a2 * r22
+            pose[(9 + k) * L + lane] += a0 * x + a1 * y + a2 * z
+
+
+@kernel
+def chain_block(model, q, value, pose, axes):
+    """Pose of the chain's end and the axes of its joints, on one block.
+
+    ``q (n * LANES)`` joint vectors; *value* ``(LANES)`` is scratch; results in ``pose (12 * LANES)`` and
+    ``axes (6 * m * LANES)``.
+    """
+    m = model.kind.shape[0]
+    place = model.place
+    for k in range(12):
+        one = 1.0 if k == 0 or k == 4 or k == 8 else 0.0
+        for lane in range(LANES):
+            pose[k * LANES + lane] = one
+    for i in range(m):
+        revolute = model.kind[i] == REVOLUTE
+        joint_value_block(q, model.coordinate[i], model.gain[i, 0], model.gain[i, 1], revolute, value)
+        if revolute:
+            revolve_block(place, i, value, pose, axes)
+        else:
+            slide_block(place, i, value, pose, axes)
+    place_block(place, m, pose)
+
+
+@kernel
+def jacobian_block(model, pose, axes, jacobian):
+    """Mixed Jacobian of the chain's own coordinates, ``jacobian (6 * k * LANES)``, from what `chain_block` gave."""
+    L = LANES
+    for j in range(6 * model.free.shape[0] * L):
+        jacobian[j] = 0.0
+    for i in range(model.kind.shape[0]):
+        a = 6 * i * L
+        c = 6 * model.column[i] * L
+        gain = model.gain[i, 0]
+        if model.kind[i] == REVOLUTE:
+            for lane in range(L):
+                dx = pose[9 * L + lane] - axes[a + lane]
+                dy = pose[10 * L + lane] - axes[a + L + lane]
+                dz = pose[11 * L + lane] - axes[a + 2 * L + lane]
+                zx = gain * axes[a + 3 * L + lane]
+                zy = gain * axes[a + 4 * L + lane]
+                zz = gain * axes[a + 5 * L + lane]
+                jacobian[c + lane] += zy * dz - zz * dy
+                jacobian[c + L + lane] += zz * dx - zx * dz
+                jacobian[c + 2 * L + lane] += zx * dy - zy * dx
+                jacobian[c + 3 * L + lane] += zx
+                jacobian[c + 4 * L + lane] += zy
+                jacobian[c + 5 * L + lane] += zz
+        else:
+            for k in range(3):
+                for lane in range(L):
+                    jacobian[c + k * L + lane] += gain * axes[a + (3 + k) * L + lane]
+
+
+@kernel
+def turn_jacobian_block(pose, columns, reference, jacobian):
+    """Change the reference of a mixed Jacobian of *columns* columns, in place.
+
+    Spatial: ``v + p × ω``; body: both parts in the axes of the frame.
+    """
+    L = LANES
+    for column in range(columns):
+        c = 6 * column * L
+        if reference == SPATIAL:
+            for lane in range(L):
+                x = pose[9 * L + lane]
+                y = pose[10 * L + lane]
+                z = pose[11 * L + lane]
+                wx = jacobian[c + 3 * L + lane]
+                wy = jacobian[c + 4 * L + lane]
+                wz = jacobian[c + 5 * L + lane]
+                jacobian[c + lane] += y * wz - z * wy
+                jacobian[c + L + lane] += z * wx - x * wz
+                jacobian[c + 2 * L + lane] += x * wy - y * wx
+        elif reference == BODY:
+            for h in (0, 3):
+                d = c + h * L
+                for lane in range(L):
+                    x = jacobian[d + lane]
+                    y = jacobian[d + L + lane]
+                    z = jacobian[d + 2 * L + lane]
+                    for k in range(3):
+                        jacobian[d + k * L + lane] = (
+                            pose[k * L + lane] * x + pose[(3 + k) * L + lane] * y + pose[(6 + k) * L + lane] * z
+                        )
+
+
+@kernel
+def store_pose(pose, first, count, out):
+    """Lanes of ``pose (12 * LANES)`` into rows of ``out (N, 16)``."""
+    for lane in range(min(LANES, count - first)):
+        row = first + lane
+        for k in range(3):
+            for j in range(3):
+                out[row, 4 * k + j] = pose[(3 * k + j) * LANES + lane]
+            out[row, 4 * k + 3] = pose[(9 + k) * LANES + lane]
+            out[row, 12 + k] = 0.0
+        out[row, 15] = 1.0
+
+
+@kernel
+def chain_poses(model, q, start, stop, out):
+    """Poses ``out (N, 16)`` of rows start … stop of ``q (N, n)``; returns the first row that is not finite, or −1."""
+    buffer = np.empty(q.shape[1] * LANES)
+    value = np.empty(LANES)
+    pose = np.empty(12 * LANES)
+    axes = np.empty(6 * model.kind.shape[0] * LANES)
+    bad = -1
+    for first in range(start, stop, LANES):
+        row = load_block(q, first, stop, buffer)
+        if row >= 0 and bad < 0:
+            bad = row
+        chain_block(model, buffer, value, pose, axes)
+        store_pose(pose, first, stop, out)
+    return bad
+
+
+@kernel
+def chain_jacobians(model, q, start, stop, reference, out, poses):
+    """Jacobians ``out (N, 6, n)`` (and ``poses (N, 16)`` unless it has no rows) of rows start … stop of ``q (N, n)``.
+
+    Columns of coordinates that do not move the frame are zero. Returns the first row that is not finite, or −1.
+    """
+    n = q.shape[1]
+    k = model.free.shape[0]
+    buffer = np.empty(n * LANES)
+    value = np.empty(LANES)
+    pose = np.empty(12 * LANES)
+    axes = np.empty(6 * model.kind.shape[0] * LANES)
+    jacobian = np.empty(6 * k * LANES)
+    bad = -1
+    for first in range(start, stop, LANES):
+        row = load_block(q, first, stop, buffer)
+        if row >= 0 and bad < 0:
+            bad = row
+        chain_block(model, buffer, value, pose, axes)
+        jacobian_block(model, pose, axes, jacobian)
+        if reference != MIXED:
+            turn_jacobian_block(pose, k, reference, jacobian)
+        if poses.shape[0]:
+            store_pose(pose, first, stop, poses)
+        for lane in range(min(LANES, stop - first)):
+            target = out[first + lane]
+            if k < n:
+                target[:] = 0.0
+            for r in range(6):
+                for c in range(k):
+                    target[r, model.free[c]] = jacobian[(6 * c + r) * LANES + lane]
+    return bad
+
+
+@kernel
+def chain_single(model, q, reference, out, jacobian):
+    """Pose ``out (4, 4)`` and, unless it has no rows, ``jacobian (6, n)`` of one ``q (n,)``; 1 if q is not finite."""
+    m = model.kind.shape[0]
+    place = model.place
+    bad = 0
+    for j in range(q.shape[0]):
+        if not math.isfinite(q[j]):
+            bad = 1
+    axes = np.empty((m, 6))
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
+    x = y = z = 0.0
+    for i in range(m + 1):
+        e00, e01, e02 = place[i, 0], place[i, 1], place[i, 2]
+        e10, e11, e12 = place[i, 3], place[i, 4], place[i, 5]
+        e20, e21, e22 = place[i, 6], place[i, 7], place[i, 8]
+        ex, ey, ez = place[i, 9], place[i, 10], place[i, 11]
+        x += r00 * ex + r01 * ey + r02 * ez
+        y += r10 * ex + r11 * ey + r12 * ez
+        z += r20 * ex + r21 * ey + r22 * ez
+        a00 = r00 * e00 + r01 * e10 + r02 * e20
+        a01 = r00 * e01 + r01 * e11 + r02 * e21
+        r02 = r00 * e02 + r01 * e12 + r02 * e22
+        a10 = r10 * e00 + r11 * e10 + r12 * e20
+        a11 = r10 * e01 + r11 * e11 + r12 * e21
+        r12 = r10 * e02 + r11 * e12 + r12 * e22
+        a20 = r20 * e00 + r21 * e10 + r22 * e20
+        a21 = r20 * e01 + r21 * e11 + r22 * e21
+        r22 = r20 * e02 + r21 * e12 + r22 * e22
+        s, c = 0.0, 1.0
+        if i < m:
+            value = model.gain[i, 0] * q[model.coordinate[i]] + model.gain[i, 1]
+            if model.kind[i] == REVOLUTE:
+                s = math.sin(value)
+                c = math.cos(value)
+            else:
+                x += r02 * value
+                y += r12 * value
+                z += r22 * value
+            axes[i, 0] = x
+            axes[i, 1] = y
+            axes[i, 2] = z
+            axes[i, 3] = r02
+            axes[i, 4] = r12
+            axes[i, 5] = r22
+        r00 = a00 * c + a01 * s
+        r01 = a01 * c - a00 * s
+        r10 = a10 * c + a11 * s
+        r11 = a11 * c - a10 * s
+        r20 = a20 * c + a21 * s
+        r21 = a21 * c - a20 * s
+    out[0, 0] = r00
+    out[0, 1] = r01
+    out[0, 2] = r02
+    out[0, 3] = x
+    out[1, 0] = r10
+    out[1, 1] = r11
+    out[1, 2] = r12
+    out[1, 3] = y
+    out[2, 0] = r20
+    out[2, 1] = r21
+    out[2, 2] = r22
+    out[2, 3] = z
+    out[3, 0] = 0.0
+    out[3, 1] = 0.0
+    out[3, 2] = 0.0
+    out[3, 3] = 1.0
+    if jacobian.shape[0]:
+        _fill_jacobian(model, axes, reference, out, jacobian)
+    return bad
+
+
+@kernel
+def _fill_jacobian(model, axes, reference, pose, jacobian):
+    """The Jacobian of one configuration from its joint axes."""
+    jacobian[:] = 0.0
+    x, y, z = pose[0, 3], pose[1, 3], pose[2, 3]
+    if reference == SPATIAL:
+        x, y, z = 0.0, 0.0, 0.0
+    for i in range(axes.shape[0]):
+        c = model.coordinate[i]
+        gain = model.gain[i, 0]
+        zx = gain * axes[i, 3]
+        zy = gain * axes[i, 4]
+        zz = gain * axes[i, 5]
+        if model.kind[i] == REVOLUTE:
+            dx = x - axes[i, 0]
+            dy = y - axes[i, 1]
+            dz = z - axes[i, 2]
+            jacobian[0, c] += zy * dz - zz * dy
+            jacobian[1, c] += zz * dx - zx * dz
+            jacobian[2, c] += zx * dy - zy * dx
+            jacobian[3, c] += zx
+            jacobian[4, c] += zy
+            jacobian[5, c] += zz
+        else:
+            jacobian[0, c] += zx
+            jacobian[1, c] += zy
+            jacobian[2, c] += zz
+    if reference == BODY:
+        for c in model.free:
+            for h in (0, 3):
+                vx, vy, vz = jacobian[h, c], jacobian[h + 1, c], jacobian[h + 2, c]
+                for k in range(3):
+                    jacobian[h + k, c] = pose[0, k] * vx + pose[1, k] * vy + pose[2, k] * vz

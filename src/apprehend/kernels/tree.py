@@ -1,0 +1,205 @@
+"""Kernels on the whole kinematic tree: poses of all frames, centre of mass. On lanes, blocks spread over threads.
+
+`TreeModel` is what a kernel sees of a robot. Fixed joints are merged away, the placement of the base is merged into
+whatever hangs on the root, and every moving joint has its own frame, turned so that the joint's axis is z. With m
+moving joints (mimicking ones included), F frames (links), and joints ordered so that a parent comes first:
+
+===============  =============  ====================================================================================
+field            shape          meaning
+===============  =============  ====================================================================================
+``parent``       (m,) int64     index of the joint that carries this one, −1: the root
+``kind``         (m,) int64     0 revolute (or continuous), 1 prismatic
+``coordinate``   (m,) int64     index into the robot's joint vector q (n,)
+``gain``         (m, 2)         multiplier, offset: the joint's value is ``multiplier * q[coordinate] + offset``
+``place``        (m, 12)        rotation (row-major, 9) and translation (3) of the joint's frame, at value 0, in the
+                                moved frame of the parent joint (parent −1: in the world)
+``frame_joint``  (F,) int64     the joint whose moved frame carries the link, −1: the root
+``frame_place``  (F, 12)        the link's frame in that moved frame (−1: in the world)
+``inertia``      (m + 1, 10)    of everything fixed to the moved frame, in its axes and about its origin: mass, mass ×
+                                centre (3), then xx, xy, xz, yy, yz, zz of the inertia; row m (so also −1): what is
+                                fixed to the root, in the world
+``armature``     (m,)           rotor inertia that adds to the joint's own, kg m² or kg
+===============  =============  ====================================================================================
+
+Lane buffers are flat as in `chain`: component c of lane l is at ``c * LANES + l``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ._jit import kernel
+from .chain import REVOLUTE, joint_value_block, load_block
+from .lanes import LANES, sincos
+
+
+class TreeModel(NamedTuple):
+    """Arrays of one robot; see the head of this module."""
+
+    parent: np.ndarray
+    kind: np.ndarray
+    coordinate: np.ndarray
+    gain: np.ndarray
+    place: np.ndarray
+    frame_joint: np.ndarray
+    frame_place: np.ndarray
+    inertia: np.ndarray
+    armature: np.ndarray
+
+
+@kernel
+def carry_block(place, i, poses, parent, target):
+    """``poses[target] = poses[parent] · place[i]`` on lanes; poses are 12 components each, parent −1 is the world."""
+    L = LANES
+    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
+    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
+    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
+    x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    t = 12 * target * L
+    if parent < 0:
+        for k in range(12):
+            value = place[i, k]
+            for lane in range(L):
+                poses[t + k * L + lane] = value
+        return
+    s = 12 * parent * L
+    for lane in range(L):
+        for k in range(3):
+            a0 = poses[s + 3 * k * L + lane]
+            a1 = poses[s + (3 * k + 1) * L + lane]
+            a2 = poses[s + (3 * k + 2) * L + lane]
+            p = poses[s + (9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
+            poses[t + 3 * k * L + lane] = a0 * r00 + a1 * r10 + a2 * r20
+            poses[t + (3 * k + 1) * L + lane] = a0 * r01 + a1 * r11 + a2 * r21
+            poses[t + (3 * k + 2) * L + lane] = a0 * r02 + a1 * r12 + a2 * r22
+            poses[t + (9 + k) * L + lane] = p
+
+
+@kernel
+def turn_block(value, poses, target):
+    """Rotate ``poses[target]`` by *value* about its own z."""
+    L = LANES
+    t = 12 * target * L
+    for lane in range(L):
+        s, c = sincos(value[lane])
+        for k in range(3):
+            b0 = poses[t + 3 * k * L + lane]
+            b1 = poses[t + (3 * k + 1) * L + lane]
+            poses[t + 3 * k * L + lane] = b0 * c + b1 * s
+            poses[t + (3 * k + 1) * L + lane] = b1 * c - b0 * s
+
+
+@kernel
+def shift_block(value, poses, target):
+    """Translate ``poses[target]`` by *value* along its own z."""
+    L = LANES
+    t = 12 * target * L
+    for lane in range(L):
+        d = value[lane]
+        for k in range(3):
+            poses[t + (9 + k) * L + lane] += d * poses[t + (3 * k + 2) * L + lane]
+
+
+@kernel
+def tree_block(model, q, value, poses):
+    """Moved frames of all joints, ``poses (12 * m * LANES)``, of ``q (n * LANES)``; *value* ``(LANES)`` is scratch."""
+    for i in range(model.kind.shape[0]):
+        revolute = model.kind[i] == REVOLUTE
+        joint_value_block(q, model.coordinate[i], model.gain[i, 0], model.gain[i, 1], revolute, value)
+        carry_block(model.place, i, poses, model.parent[i], i)
+        if revolute:
+            turn_block(value, poses, i)
+        else:
+            shift_block(value, poses, i)
+
+
+@kernel
+def tree_poses(model, q, start, stop, out):
+    """Poses of all frames, ``out (N, F, 16)``, of rows start … stop of ``q (N, n)``.
+
+    Returns the first row that is not finite, or −1.
+    """
+    m = model.kind.shape[0]
+    buffer = np.empty(q.shape[1] * LANES)
+    value = np.empty(LANES)
+    poses = np.empty(12 * (m + 1) * LANES)
+    frame = m
+    bad = -1
+    for first in range(start, stop, LANES):
+        row = load_block(q, first, stop, buffer)
+        if row >= 0 and bad < 0:
+            bad = row
+        tree_block(model, buffer, value, poses)
+        for f in range(model.frame_joint.shape[0]):
+            carry_block(model.frame_place, f, poses, model.frame_joint[f], frame)
+            t = 12 * frame * LANES
+            for lane in range(min(LANES, stop - first)):
+                target = out[first + lane, f]
+                for k in range(3):
+                    for j in range(3):
+                        target[4 * k + j] = poses[t + (3 * k + j) * LANES + lane]
+                    target[4 * k + 3] = poses[t + (9 + k) * LANES + lane]
+                    target[12 + k] = 0.0
+                target[15] = 1.0
+    return bad
+
+
+@kernel
+def tree_single(model, q, poses):
+    """Moved frames of all joints, ``poses (m, 12)``, of one ``q (n,)``; returns 1 if q is not finite."""
+    bad = 0
+    for j in range(q.shape[0]):
+        if not math.isfinite(q[j]):
+            bad = 1
+    for i in range(model.kind.shape[0]):
+        _compose(poses, model.parent[i], model.place, i, poses[i])
+        value = model.gain[i, 0] * q[model.coordinate[i]] + model.gain[i, 1]
+        T = poses[i]
+        if model.kind[i] == REVOLUTE:
+            s = math.sin(value)
+            c = math.cos(value)
+            for k in range(3):
+                b0 = T[3 * k]
+                b1 = T[3 * k + 1]
+                T[3 * k] = b0 * c + b1 * s
+                T[3 * k + 1] = b1 * c - b0 * s
+        else:
+            for k in range(3):
+                T[9 + k] += value * T[3 * k + 2]
+    return bad
+
+
+@kernel
+def _compose(poses, parent, place, i, out):
+    """``out = poses[parent] · place[i]``, each as 12 numbers; parent −1 is the world."""
+    if parent < 0:
+        for k in range(12):
+            out[k] = place[i, k]
+        return
+    for k in range(3):
+        a0 = poses[parent, 3 * k]
+        a1 = poses[parent, 3 * k + 1]
+        a2 = poses[parent, 3 * k + 2]
+        for j in range(3):
+            out[3 * k + j] = a0 * place[i, j] + a1 * place[i, 3 + j] + a2 * place[i, 6 + j]
+        out[9 + k] = poses[parent, 9 + k] + a0 * place[i, 9] + a1 * place[i, 10] + a2 * place[i, 11]
+
+
+@kernel
+def frames_single(model, q, out):
+    """Poses of all frames, ``out (F, 4, 4)``, of one ``q (n,)``; returns 1 if q is not finite."""
+    poses = np.empty((model.kind.shape[0], 12))
+    bad = tree_single(model, q, poses)
+    T = np.empty(12)
+    for f in range(model.frame_joint.shape[0]):
+        _compose(poses, model.frame_joint[f], model.frame_place, f, T)
+        for k in range(3):
+            for j in range(3):
+                out[f, k, j] = T[3 * k + j]
+            out[f, k, 3] = T[9 + k]
+            out[f, 3, k] = 0.0
+        out[f, 3, 3] = 1.0
+    return bad
