@@ -1,0 +1,429 @@
+"""Scenes as TOML files.
+
+::
+
+    clearance = 0.005                       # m, optional
+    gravity = 9.81                          # m/s², optional
+
+    [robot]
+    arm = "ur5e"                            # catalogue name, or a path beside this file
+    hand = "robotiq_2f_85"                  # optional
+    at = "tool0"                            # the arm's link that carries the hand; optional
+    mount = {xyz = [0, 0, 0.01]}            # pose of the hand in that link; optional
+    base = {xyz = [0, 0, 0], rpy_deg = [0, 0, 90]}
+
+    [[box]]                                 # fixed; any number
+    name = "table"
+    size = [1.0, 1.4, 0.04]
+    pose = {xyz = [0.6, 0, -0.02]}
+
+    [[body]]                                # any number
+    mesh = "mug.obj"                        # or household = "mug", box = [x, y, z],
+                                            # cylinder = [radius, length], sphere = radius
+    mass = 0.3                              # kg; or density in kg/m³
+    pose = {xyz = [0.5, -0.2, 0.05], rpy_deg = [0, 0, 30]}
+    # or: rest = {on = "table", xy = [0.5, -0.2], yaw_deg = 30, choose = 0}
+
+    [task]
+    pick = "mug"
+    place = {xyz = [0.5, 0.2, 0.05]}
+    upright = true
+
+Poses hold ``xyz`` in m and one of ``rpy_deg``, ``rpy`` (fixed axes x, y, z in this order, as in URDF) or ``wxyz``
+(unit quaternion). Anything unknown is an error that names the file, the table and the key.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..arrays import Array
+from ..conventions import DEGREE, GRAVITY
+from ..errors import ApprehendError, DescriptionError, suggestion
+from .scene import Box, Placed, RobotSource, Scene
+from .tabletop import resting
+
+if TYPE_CHECKING:
+    from ..bodies import Body
+
+SIZE_LIMIT = 1_000_000
+"""Largest scene file in bytes."""
+
+TOP = ("robot", "box", "body", "goal", "task", "clearance", "gravity")
+ROBOT = ("arm", "hand", "at", "mount", "base", "prefix")
+BOX = ("name", "size", "pose", "rgba", "friction")
+SHAPES = ("mesh", "household", "box", "cylinder", "sphere")
+BODY = ("name", *SHAPES, "units", "mass", "density", "friction", "pose", "rest", "movable")
+REST = ("on", "xy", "yaw_deg", "choose")
+TASK = ("pick", "place", "upright")
+GOAL = ("body", "pose")
+POSE = ("xyz", "rpy", "rpy_deg", "wxyz")
+
+
+class Table:
+    """One table of the file with its place, so that every message can say where it stood."""
+
+    def __init__(self, values: object, where: str, allowed: tuple[str, ...]):
+        if not isinstance(values, Mapping):
+            raise DescriptionError(f"{where} is {values!r}; expected a table with the keys {', '.join(allowed)}")
+        for key in values:
+            if key not in allowed:
+                hint = suggestion(key, allowed) or f" Known keys: {', '.join(allowed)}."
+                raise DescriptionError(f"{where} has an unknown key {key!r}.{hint}")
+        self.values: Mapping[str, Any] = values
+        self.where = where
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def error(self, key: str, expected: str) -> DescriptionError:
+        """The error for a key whose value is not what is *expected*."""
+        return DescriptionError(f"{self.where}: {key} is {self.values.get(key)!r}; expected {expected}")
+
+    def text(self, key: str, default: str | None = None) -> str | None:
+        """A string."""
+        if key not in self.values:
+            return default
+        if not isinstance(self.values[key], str) or not self.values[key]:
+            raise self.error(key, "a text in quotes")
+        return str(self.values[key])
+
+    def need_text(self, key: str) -> str:
+        """A string that must be there."""
+        value = self.text(key)
+        if value is None:
+            raise DescriptionError(f"{self.where} has no {key!r}; it needs one")
+        return value
+
+    def number(self, key: str, default: float, *, at_least: float = -np.inf) -> float:
+        """A finite number."""
+        if key not in self.values:
+            return default
+        value = self.values[key]
+        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value) or value < at_least:
+            raise self.error(key, "a finite number" + (f", {at_least:g} or more" if np.isfinite(at_least) else ""))
+        return float(value)
+
+    def flag(self, key: str, default: bool) -> bool:
+        """true or false."""
+        value = self.values.get(key, default)
+        if not isinstance(value, bool):
+            raise self.error(key, "true or false")
+        return value
+
+    def numbers(self, key: str, count: int) -> Array:
+        """A list of *count* finite numbers that must be there."""
+        value = self.values.get(key)
+        good = isinstance(value, list) and len(value) == count
+        if not good or any(
+            isinstance(v, bool) or not isinstance(v, int | float) or not np.isfinite(v) for v in value or []
+        ):
+            raise self.error(key, f"a list of {count} finite numbers")
+        return np.array(value, dtype=np.float64)
+
+    def pose(self, key: str) -> Array:
+        """A pose that must be there: ``{xyz, rpy_deg | rpy | wxyz}``."""
+        if key not in self.values:
+            raise DescriptionError(f"{self.where} has no {key!r}; expected a pose such as {{xyz = [0.5, 0, 0.1]}}")
+        table = Table(self.values[key], f"{self.where}, {key}", POSE)
+        turns = [k for k in POSE[1:] if k in table]
+        if len(turns) > 1:
+            raise DescriptionError(f"{table.where} has both {turns[0]} and {turns[1]}; give one rotation")
+        T = np.eye(4)
+        if "wxyz" in table:
+            quaternion = table.numbers("wxyz", 4)
+            norm = float(np.linalg.norm(quaternion))
+            if abs(norm - 1.0) > 1e-3:
+                raise DescriptionError(f"{table.where}: wxyz has length {norm:.4g}; a rotation is a unit quaternion")
+            T[:3, :3] = quaternion_matrix(quaternion / norm)
+        elif turns:
+            T[:3, :3] = rpy_matrix(table.numbers(turns[0], 3) * (DEGREE if turns[0] == "rpy_deg" else 1.0))
+        T[:3, 3] = table.numbers("xyz", 3) if "xyz" in table else 0.0
+        return T
+
+
+def load(path: Path) -> Scene:
+    """Read the scene file *path*."""
+    where = f"scene {path}"
+    try:
+        if path.stat().st_size > SIZE_LIMIT:
+            raise DescriptionError(f"{where} has {path.stat().st_size} bytes; a scene file has at most {SIZE_LIMIT}")
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        near = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        raise DescriptionError(f"there is no scene file {path}.{suggestion(path.name, near)}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise DescriptionError(f"{where} cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise DescriptionError(f"{where} is not TOML: {error}") from error
+    top = Table(data, where, TOP)
+    if "robot" not in data:
+        raise DescriptionError(f'{where} has no [robot] table; expected for instance [robot] with arm = "ur5e"')
+    source = _robot(Table(data["robot"], f"{where}, [robot]", ROBOT), path.parent)
+    boxes = tuple(_box(table) for table in _tables(data, "box", where, BOX))
+    tables = _tables(data, "body", where, BODY)
+    placed = [_body(table, path.parent, boxes) for table in tables]
+    names = [p.body.name for p in placed]
+    for name, table in zip(names, tables, strict=True):
+        if names.count(name) > 1:
+            raise DescriptionError(
+                f"{table.where}: there are {names.count(name)} bodies named {name!r}; give each a name"
+            )
+    bodies = {p.body.name: p for p in placed}
+    goals, pick, upright = _task(data, where, bodies)
+    robot, hand_root = _at(f"{where}, [robot]", source.build)
+    return Scene(
+        robot=robot,
+        robot_source=source,
+        bodies=bodies,
+        boxes=boxes,
+        goals=goals,
+        pick=pick,
+        upright=upright,
+        clearance=top.number("clearance", 0.0, at_least=0.0),
+        gravity=top.number("gravity", GRAVITY),
+        hand_root=hand_root,
+        source=path,
+    )
+
+
+def _at(where: str, call: Any, *args: Any, **options: Any) -> Any:
+    """Call, and put *where* before the message of an error."""
+    try:
+        return call(*args, **options)
+    except ApprehendError as error:
+        raise type(error)(f"{where}: {error}") from error
+
+
+def _tables(data: Mapping[str, Any], key: str, where: str, allowed: tuple[str, ...]) -> list[Table]:
+    values = data.get(key, [])
+    if not isinstance(values, list):
+        raise DescriptionError(f"{where}: write [[{key}]] with two brackets, for there may be several")
+    return [Table(v, f"{where}, [[{key}]] number {i + 1}", allowed) for i, v in enumerate(values)]
+
+
+def _beside(folder: Path, name: str) -> str:
+    """*name* as a path beside the scene file where it looks like a file, else as it is (a catalogue name)."""
+    looks_like_file = "/" in name or "\\" in name or Path(name).suffix.lower() in (".urdf", ".xml", ".toml")
+    return str(folder / name) if looks_like_file and (folder / name).exists() else name
+
+
+def _robot(table: Table, folder: Path) -> RobotSource:
+    hand = table.text("hand")
+    if hand is None and ("at" in table or "mount" in table or "prefix" in table):
+        raise DescriptionError(f"{table.where} says where a hand is mounted but names no hand")
+    prefix = table.values.get("prefix")
+    if prefix is not None and not isinstance(prefix, str):
+        raise table.error("prefix", "a text in quotes")
+    return RobotSource(
+        arm=_beside(folder, table.need_text("arm")),
+        hand=None if hand is None else _beside(folder, hand),
+        at=table.text("at"),
+        mount=table.pose("mount") if "mount" in table else np.eye(4),
+        base=table.pose("base") if "base" in table else np.eye(4),
+        prefix=prefix,
+    )
+
+
+def _box(table: Table) -> Box:
+    options: dict[str, Any] = {}
+    if "rgba" in table:
+        options["rgba"] = tuple(float(c) for c in table.numbers("rgba", 4))
+    if "friction" in table:
+        options["friction"] = table.number("friction", 0.0, at_least=0.0)
+    pose = table.pose("pose")
+    box: Box = _at(table.where, Box, table.need_text("name"), table.numbers("size", 3), pose, **options)
+    return box
+
+
+def _body(table: Table, folder: Path, boxes: tuple[Box, ...]) -> Placed:
+    from ..bodies import Body
+
+    shapes = [k for k in SHAPES if k in table]
+    if len(shapes) != 1:
+        found = " and ".join(shapes) if shapes else "none"
+        raise DescriptionError(f"{table.where} needs one of {', '.join(SHAPES)}; it has {found}")
+    kind = shapes[0]
+    if "mass" in table and "density" in table:
+        raise DescriptionError(f"{table.where} has both mass and density; give one")
+    if "units" in table and kind != "mesh":
+        raise DescriptionError(f"{table.where}: units belong to a mesh; a {kind} is given in metres")
+    options: dict[str, Any] = {k: table.number(k, 0.0) for k in ("mass", "density", "friction") if k in table}
+    options |= {k: table.need_text(k) for k in ("name", "units") if k in table}
+    origin: dict[str, object] = {}
+    if kind == "mesh":
+        mesh = folder / table.need_text("mesh")
+        origin = {"mesh": str(mesh.resolve())} | ({"units": options["units"]} if "units" in options else {})
+        body = _at(table.where, Body.load, mesh, **options)
+    elif kind == "household":
+        origin = {"household": table.need_text("household")}
+        body = _at(table.where, Body.household, table.need_text("household"))
+        if "density" in options:
+            options["mass"] = options.pop("density") * body.volume
+        body = _at(table.where, body.with_, **options)
+    elif kind == "sphere":
+        origin = {"sphere": table.number("sphere", 0.0)}
+        body = _at(table.where, Body.sphere, origin["sphere"], **options)
+    else:
+        numbers = table.numbers(kind, 3 if kind == "box" else 2)
+        origin = {kind: numbers.tolist()}
+        make = Body.box if kind == "box" else Body.cylinder
+        body = _at(
+            table.where,
+            make,
+            numbers if kind == "box" else numbers[0],
+            *([] if kind == "box" else numbers[1:]),
+            **options,
+        )
+    if ("pose" in table) == ("rest" in table):
+        raise DescriptionError(f"{table.where} needs either a pose or a rest on a box")
+    pose = table.pose("pose") if "pose" in table else _rest(table, body, boxes)
+    return Placed(body, pose, table.flag("movable", True), origin)
+
+
+def _rest(table: Table, body: Body, boxes: tuple[Box, ...]) -> Array:
+    rest = Table(table.values["rest"], f"{table.where}, rest", REST)
+    on = rest.need_text("on")
+    for box in boxes:
+        if box.name == on:
+            break
+    else:
+        hint = suggestion(on, [b.name for b in boxes])
+        raise DescriptionError(f"{rest.where}: there is no box named {on!r} in this scene.{hint}")
+    x, y = rest.numbers("xy", 2)
+    choose = rest.values.get("choose", 0)
+    if isinstance(choose, bool) or not isinstance(choose, int):
+        raise rest.error("choose", "a whole number (0: the most probable stable pose)")
+    yaw = rest.number("yaw_deg", 0.0) * DEGREE
+    pose: Array = _at(rest.where, resting, body, float(x), float(y), box.top, yaw=yaw, choose=choose)
+    return pose
+
+
+def _task(
+    data: Mapping[str, Any], where: str, bodies: Mapping[str, Placed]
+) -> tuple[dict[str, Array], str | None, bool]:
+    goals: dict[str, Array] = {}
+
+    def known(table: Table, key: str) -> str:
+        name = table.need_text(key)
+        if name not in bodies:
+            hint = suggestion(name, bodies) or f" There are: {', '.join(bodies) or 'none'}."
+            raise DescriptionError(f"{table.where}: {key} names {name!r}, which is no body of this scene.{hint}")
+        return name
+
+    for table in _tables(data, "goal", where, GOAL):
+        goals[known(table, "body")] = table.pose("pose")
+    if "task" not in data:
+        return goals, None, False
+    task = Table(data["task"], f"{where}, [task]", TASK)
+    pick = known(task, "pick")
+    if "place" in task:
+        goals[pick] = task.pose("place")
+    return goals, pick, task.flag("upright", False)
+
+
+# --- writing -------------------------------------------------------------------------------------------------------
+def save(scene: Scene, path: Path) -> Path:
+    """Write *scene* to *path* (whole or not at all); bodies without an origin go into meshes beside it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    source = scene.robot_source
+    lines = [
+        f"clearance = {scene.clearance!r}",
+        f"gravity = {scene.gravity!r}",
+        "",
+        "[robot]",
+        f"arm = {_quoted(source.arm)}",
+    ]
+    if source.hand is not None:
+        lines.append(f"hand = {_quoted(source.hand)}")
+        lines += [f"at = {_quoted(source.at)}"] * (source.at is not None)
+        lines += [f"prefix = {_quoted(source.prefix)}"] * (source.prefix is not None)
+        lines.append(f"mount = {_pose_text(source.mount)}")
+    lines.append(f"base = {_pose_text(source.base)}")
+    for box in scene.boxes:
+        lines += [
+            "",
+            "[[box]]",
+            f"name = {_quoted(box.name)}",
+            f"size = {box.size.tolist()}",
+            f"pose = {_pose_text(box.pose)}",
+        ]
+        lines += [f"rgba = {[float(c) for c in box.rgba]}", f"friction = {box.friction!r}"]
+    for name, placed in scene.bodies.items():
+        body, origin = placed.body, placed.origin
+        if origin is None:
+            mesh = path.parent / f"{path.stem}_{name}.obj"
+            body.save(mesh)
+            origin = {"mesh": str(mesh)}
+        lines += ["", "[[body]]", f"name = {_quoted(name)}"]
+        for key, value in origin.items():
+            if key == "mesh" and Path(str(value)).is_relative_to(path.parent.resolve()):
+                value = Path(str(value)).relative_to(path.parent.resolve()).as_posix()
+            elif key == "mesh" and Path(str(value)).parent == path.parent:
+                value = Path(str(value)).name
+            lines.append(f"{key} = {_quoted(value) if isinstance(value, str) else value}")
+        lines += [
+            f"mass = {float(body.mass)!r}",
+            f"friction = {float(body.friction)!r}",
+            f"pose = {_pose_text(placed.pose)}",
+        ]
+        lines += ["movable = false"] * (not placed.movable)
+    for name, goal in scene.goals.items():
+        if name != scene.pick:
+            lines += ["", "[[goal]]", f"body = {_quoted(name)}", f"pose = {_pose_text(goal)}"]
+    if scene.pick is not None:
+        lines += ["", "[task]", f"pick = {_quoted(scene.pick)}", f"upright = {str(scene.upright).lower()}"]
+        if scene.pick in scene.goals:
+            lines.append(f"place = {_pose_text(scene.goals[scene.pick])}")
+    temporary = path.with_name(path.name + ".partial")
+    temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    temporary.replace(path)
+    return path
+
+
+def _quoted(text: object) -> str:
+    escaped = str(text).replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
+
+
+def _pose_text(T: Array) -> str:
+    return f"{{xyz = {T[:3, 3].tolist()}, wxyz = {matrix_quaternion(T[:3, :3]).tolist()}}}"
+
+
+# --- rotations -----------------------------------------------------------------------------------------------------
+def rpy_matrix(rpy: Array) -> Array:
+    """Rotation Rz(yaw) Ry(pitch) Rx(roll): roll, pitch, yaw about fixed axes, as in URDF."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def quaternion_matrix(q: Array) -> Array:
+    """Rotation matrix of the unit quaternion (w, x, y, z)."""
+    w, v = q[0], q[1:]
+    cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    return np.eye(3) + 2.0 * (w * cross + cross @ cross)
+
+
+def matrix_quaternion(R: Array) -> Array:
+    """Unit quaternion (w, x, y, z) of a rotation matrix: the eigenvector of Bar-Itzhack's symmetric matrix."""
+    K = np.array(
+        [
+            [np.trace(R), R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
+            [0.0, R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]],
+            [0.0, 0.0, R[1, 1] - R[0, 0] - R[2, 2], R[1, 2] + R[2, 1]],
+            [0.0, 0.0, 0.0, R[2, 2] - R[0, 0] - R[1, 1]],
+        ]
+    )
+    q = np.linalg.eigh(K, UPLO="U")[1][:, -1]
+    return q if q[0] >= 0.0 else -q
