@@ -1,1 +1,50 @@
-"""robots."""
+"""Descriptions of robots and hands: readers, the catalogue, and what can be made of descriptions.
+
+What computes with a description is `apprehend.kinematics.Robot`.
+"""
+
+from __future__ import annotations
+
+from . import catalogue
+from .combine import attach, renamed, subtree, without
+from .description import (
+    Description,
+    Inertial,
+    Joint,
+    JointLimits,
+    JointType,
+    Link,
+    Mimic,
+    Repair,
+    Shape,
+    ShapeKind,
+)
+from .load import load_description
+from .meshes import load_shape_mesh, read_mesh
+from .srdf import Semantics, read_srdf
+from .urdf import parse_urdf, read_urdf
+
+__all__ = [
+    "Description",
+    "Inertial",
+    "Joint",
+    "JointLimits",
+    "JointType",
+    "Link",
+    "Mimic",
+    "Repair",
+    "Semantics",
+    "Shape",
+    "ShapeKind",
+    "attach",
+    "catalogue",
+    "load_description",
+    "load_shape_mesh",
+    "parse_urdf",
+    "read_mesh",
+    "read_srdf",
+    "read_urdf",
+    "renamed",
+    "subtree",
+    "without",
+]

@@ -129,6 +129,7 @@ class Description:
     allowed_collisions: frozenset[frozenset[str]] = frozenset()  # pairs of links that may touch
     repairs: tuple[Repair, ...] = ()
     source: Path | None = None
+    tool: str = ""  # frame that carries a tool, or at which grasps and targets are meant; "" if not known
 
     def joint(self, name: str) -> Joint:
         """The joint of that name."""

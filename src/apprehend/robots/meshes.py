@@ -1,0 +1,74 @@
+"""Mesh files of a description as plain triangles, in metres of the shape's own frame."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array, IntArray
+from ..errors import MeshError
+from .description import Shape, ShapeKind
+
+MAX_BYTES = 512 * 1024 * 1024
+"""Largest mesh file that is read."""
+
+
+def load_shape_mesh(shape: Shape) -> tuple[Array, IntArray]:
+    """Vertices ``(V, 3)`` and faces ``(F, 3)`` of a mesh shape, scaled to metres; ``shape.pose`` is *not* applied.
+
+    Equal vertices are merged (STL repeats every corner); faces without area are kept. A COLLADA file's unit and up axis
+    are applied, as ROS tools do. All parts of a file are joined. A scale that mirrors turns the faces round, so that
+    they keep looking outwards. Raises `MeshError` for files that are missing, unreadable, or without faces.
+    """
+    if shape.kind is not ShapeKind.MESH or shape.mesh is None:
+        raise MeshError(f"shape {shape.name!r} is a {shape.kind.value}, not a mesh")
+    vertices, faces = read_mesh(shape.mesh)
+    scale = np.asarray(shape.size)
+    if np.prod(scale) < 0:
+        faces = faces[:, ::-1]
+    return np.ascontiguousarray(vertices * scale), np.ascontiguousarray(faces)
+
+
+def read_mesh(path: Path) -> tuple[Array, IntArray]:
+    """Vertices ``(V, 3)`` and faces ``(F, 3)`` of a mesh file, merged, in the unit of the file (COLLADA: metres)."""
+    import trimesh
+
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise MeshError(f"{path} has {path.stat().st_size / 1e6:.0f} MB; a mesh may have {MAX_BYTES / 1e6:.0f} MB")
+        data = path.read_bytes()
+    except OSError as error:
+        raise MeshError(f"mesh {path} cannot be read: {error.strerror}") from error
+    kind = path.suffix.lower().lstrip(".")
+    if kind == "dae":
+        _refuse_entities(data, path)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            loaded: Any = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False, skip_materials=True)
+        mesh = loaded.to_mesh()
+        vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+        faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
+    except Exception as error:  # the readers of third parties raise anything
+        raise MeshError(f"mesh {path} cannot be read as {kind}: {type(error).__name__}: {error}") from error
+    if not len(faces):
+        raise MeshError(f"mesh {path} has no faces")
+    if not np.isfinite(vertices).all():
+        raise MeshError(f"mesh {path} has vertices that are not finite")
+    return _merged(vertices, faces)
+
+
+def _merged(vertices: Array, faces: IntArray) -> tuple[Array, IntArray]:
+    """Equal vertices joined; unused ones dropped."""
+    used, index = np.unique(vertices[faces.ravel()] + 0.0, axis=0, return_inverse=True)
+    return used, index.reshape(-1, 3).astype(np.int64)
+
+
+def _refuse_entities(data: bytes, path: Path) -> None:
+    head = data.replace(b"\0", b"").upper()
+    if b"<!DOCTYPE" in head or b"<!ENTITY" in head:
+        raise MeshError(f"mesh {path} declares a DOCTYPE or entities, which is refused; remove the declaration")

@@ -1,0 +1,132 @@
+"""Where mesh files lie: ``package://``, ``file://``, absolute and relative names, kept inside the allowed folders.
+
+Allowed are the package that the description belongs to (the nearest folder above it with a ``package.xml``; else its
+own folder, and the one above where its own is named like a part of a package: ``urdf``, ``robots``, …), the folders
+of packages that its names refer to, and every folder that the caller passes as ``packages``.
+"""
+
+from __future__ import annotations
+
+import os
+import sysconfig
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from urllib.parse import unquote
+
+from ..errors import DescriptionError, MeshError
+
+Packages = Mapping[str, str | Path] | Sequence[str | Path] | str | Path | None
+"""``{package name: its folder}``, or folders that hold packages or meshes."""
+
+MESH_SUFFIXES = (".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
+_SUBFOLDERS = {"urdf", "robots", "robot", "models", "model", "mjcf", "xml", "description", "xacro", "sdf"}
+
+
+@cache
+def shared_folders() -> tuple[Path, ...]:
+    """Folders in which installed wheels keep packages named by ``package://``."""
+    site = [Path(p) for p in {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")} if p]
+    candidates = [s / "cmeel.prefix" / "share" for s in site] + site
+    return tuple(p for p in candidates if p.is_dir())
+
+
+def _environment_folders() -> list[Path]:
+    folders = [Path(p) for p in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
+    for variable in ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH"):
+        folders += [Path(p) / "share" for p in os.environ.get(variable, "").split(os.pathsep) if p]
+    return folders
+
+
+def _package_root(folder: Path) -> Path:
+    """The folder that a description in *folder* may reach into."""
+    for candidate in (folder, *list(folder.parents)[:3]):
+        if (candidate / "package.xml").is_file():
+            return candidate
+    above = folder.parent
+    return above if folder.name.lower() in _SUBFOLDERS and above != above.parent and above != Path.home() else folder
+
+
+class MeshPaths:
+    """Resolves the mesh names of one description file."""
+
+    def __init__(self, source: Path, packages: Packages) -> None:
+        self.folder = source.resolve().parent
+        self.named: dict[str, Path] = {}
+        self.folders: list[Path] = []
+        if isinstance(packages, Mapping):
+            self.named = {str(k): Path(v).resolve() for k, v in packages.items()}
+        elif isinstance(packages, (str, Path)):
+            self.folders = [Path(packages).resolve()]
+        elif packages is not None:
+            self.folders = [Path(p).resolve() for p in packages]
+        self.allowed = [_package_root(self.folder), *self.folders, *self.named.values()]
+
+    def resolve(self, name: str, where: str) -> Path:
+        """The existing file that *name* means; *where* is the place in the description, for messages."""
+        scheme, _, rest = name.partition("://") if "://" in name else ("", "", name)
+        rest = unquote(rest) if scheme else rest
+        if scheme in ("package", "model"):
+            package, _, inner = rest.lstrip("/").partition("/")
+            roots = self._package_folders(package)
+            if not roots:
+                raise MeshError(
+                    f"{where}: mesh {name!r}: no folder of the package {package!r} was found; "
+                    f"pass packages={{{package!r}: folder}}"
+                )
+            paths = [self._inside(root / inner, root, name, where) for root in roots]
+        elif scheme in ("", "file"):
+            path = Path(rest)
+            if path.is_absolute():
+                paths = [self._allowed(path, name, where)]
+            else:
+                paths = [self._allowed(base / path, name, where) for base in (self.folder, *self.folders)]
+        else:
+            raise DescriptionError(
+                f"{where}: mesh {name!r}: the scheme {scheme}:// is not read; expected package:// or a file"
+            )
+        if paths[0].suffix.lower() not in MESH_SUFFIXES:
+            raise MeshError(f"{where}: mesh {name!r}: files of type {paths[0].suffix or 'none'!r} are not read; "
+                            f"expected one of {', '.join(MESH_SUFFIXES)}")  # fmt: skip
+        for path in paths:
+            if path.is_file():
+                return path
+        tried = ", ".join(str(p) for p in paths)
+        raise MeshError(
+            f"{where}: mesh {name!r} does not exist (looked for {tried}); "
+            "pass packages=folder of the meshes, or meshes='ignore' to load without geometry"
+        )
+
+    def _package_folders(self, package: str) -> list[Path]:
+        if package in self.named:
+            return [self.named[package]]
+        candidates = [f / package for f in self.folders] + [f for f in self.folders if f.name == package]
+        for above in (self.folder, *self.folder.parents):
+            if above.name == package:
+                candidates.append(above)
+            elif (above / package).is_dir() and above != above.parent:
+                candidates.append(above / package)
+        candidates += [f / package for f in (*_environment_folders(), *shared_folders())]
+        found: list[Path] = []
+        for candidate in candidates:
+            if package not in ("", ".", "..") and candidate.is_dir() and candidate.resolve() not in found:
+                found.append(candidate.resolve())
+        return found
+
+    def _inside(self, path: Path, root: Path, name: str, where: str) -> Path:
+        real = path.resolve()
+        if not real.is_relative_to(root) and not any(real.is_relative_to(a) for a in self.allowed):
+            raise DescriptionError(f"{where}: mesh {name!r} leaves its package folder {root}; refused")
+        return real
+
+    def _allowed(self, path: Path, name: str, where: str) -> Path:
+        real = path.resolve()
+        if any(real.is_relative_to(a) for a in self.allowed):
+            return real
+        if any(real.is_relative_to(s) for s in shared_folders()):
+            return real
+        allowed = ", ".join(str(a) for a in self.allowed)
+        raise DescriptionError(
+            f"{where}: mesh {name!r} is {real}, outside the allowed folders ({allowed}); refused. "
+            "If it is meant, pass packages=folder of the meshes"
+        )
