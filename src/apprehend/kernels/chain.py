@@ -78,36 +78,50 @@ def load_block(q, first, count, out):
 
 
 @kernel
-def wrap_large(value):
-    """Bring lanes outside the range of `sincos` back by whole turns."""
-    for lane in range(value.shape[0]):
-        if abs(value[lane]) > SINCOS_RANGE:
-            value[lane] = math.atan2(math.sin(value[lane]), math.cos(value[lane]))
-
-
-@kernel
-def joint_value_block(q, coordinate, multiplier, offset, revolute, value):
-    """Values of one joint on the lanes of ``q (n * LANES)``; angles are kept within the range of `sincos`."""
-    start = coordinate * LANES
-    largest = 0.0
+def wrap_angles(q, coordinate, multiplier, offset, value):
+    """Angles of one joint on the lanes, brought within the range of `sincos` by whole turns."""
     for lane in range(LANES):
-        v = multiplier * q[start + lane] + offset
-        value[lane] = v
-        largest = max(largest, abs(v))
-    if revolute and largest > SINCOS_RANGE:
-        wrap_large(value)
+        v = multiplier * q[coordinate * LANES + lane] + offset
+        value[lane] = math.atan2(math.sin(v), math.cos(v))
+
+
+@kernel(inline=True)
+def at(index, width):
+    """Where item *index* of *width* components begins in a flat lane buffer.
+
+    The mask tells the compiler that it is not negative; without it, Numba's handling of negative indices keeps the
+    lane loops from vectorising.
+    """
+    return (index * width * LANES) & 0x7FFFFFFF
 
 
 @kernel
-def revolve_block(place, i, value, pose, axes):
-    """Move ``pose (12 * LANES)`` through ``place[i]`` and a rotation by *value* about z; joint i's axis into *axes*."""
+def within_sincos(q, model):
+    """Whether every angle of a block ``q (n * LANES)`` is within the range of `sincos`: almost always."""
+    total = 0.0
+    for j in range(q.shape[0]):
+        total += abs(q[j])
+    bound = 0.0
+    for i in range(model.gain.shape[0]):
+        bound = max(bound, abs(model.gain[i, 0]) * total + abs(model.gain[i, 1]))
+    return bound <= SINCOS_RANGE
+
+
+@kernel(inline=True)
+def revolve_block(place, i, q, coordinate, multiplier, offset, pose, axes):
+    """Move ``pose (12 * LANES)`` through ``place[i]`` and a rotation about z; joint i's axis goes into *axes*.
+
+    The angle is ``multiplier * q[coordinate] + offset``.
+    """
     L = LANES
     r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
     r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
     r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
     x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    d = at(coordinate, 1)
+    a = at(i, 6)
     for lane in range(L):
-        s, c = sincos(value[lane])
+        s, c = sincos(multiplier * q[d + lane] + offset)
         for k in range(3):
             a0 = pose[3 * k * L + lane]
             a1 = pose[(3 * k + 1) * L + lane]
@@ -120,32 +134,34 @@ def revolve_block(place, i, value, pose, axes):
             pose[(3 * k + 1) * L + lane] = b1 * c - b0 * s
             pose[(3 * k + 2) * L + lane] = b2
             pose[(9 + k) * L + lane] = p
-            axes[(6 * i + k) * L + lane] = p
-            axes[(6 * i + 3 + k) * L + lane] = b2
+            axes[a + k * L + lane] = p
+            axes[a + (3 + k) * L + lane] = b2
 
 
-@kernel
-def slide_block(place, i, value, pose, axes):
-    """As `revolve_block`, for a translation by *value* along z."""
+@kernel(inline=True)
+def slide_block(place, i, q, coordinate, multiplier, offset, pose, axes):
+    """As `revolve_block`, for a translation along z."""
     L = LANES
     r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
     r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
     r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
     x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    d = at(coordinate, 1)
+    a = at(i, 6)
     for lane in range(L):
-        d = value[lane]
+        h = multiplier * q[d + lane] + offset
         for k in range(3):
             a0 = pose[3 * k * L + lane]
             a1 = pose[(3 * k + 1) * L + lane]
             a2 = pose[(3 * k + 2) * L + lane]
             b2 = a0 * r02 + a1 * r12 + a2 * r22
-            p = pose[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z + b2 * d
+            p = pose[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z + b2 * h
             pose[3 * k * L + lane] = a0 * r00 + a1 * r10 + a2 * r20
             pose[(3 * k + 1) * L + lane] = a0 * r01 + a1 * r11 + a2 * r21
             pose[(3 * k + 2) * L + lane] = b2
             pose[(9 + k) * L + lane] = p
-            axes[(6 * i + k) * L + lane] = p
-            axes[(6 * i + 3 + k) * L + lane] = b2
+            axes[a + k * L + lane] = p
+            axes[a + (3 + k) * L + lane] = b2
 
 
 @kernel
@@ -176,17 +192,21 @@ def chain_block(model, q, value, pose, axes):
     """
     m = model.kind.shape[0]
     place = model.place
+    gain = model.gain
+    coordinate = model.coordinate
+    near = within_sincos(q, model)
     for k in range(12):
         one = 1.0 if k == 0 or k == 4 or k == 8 else 0.0
         for lane in range(LANES):
             pose[k * LANES + lane] = one
     for i in range(m):
-        revolute = model.kind[i] == REVOLUTE
-        joint_value_block(q, model.coordinate[i], model.gain[i, 0], model.gain[i, 1], revolute, value)
-        if revolute:
-            revolve_block(place, i, value, pose, axes)
+        if model.kind[i] == PRISMATIC:
+            slide_block(place, i, q, coordinate[i], gain[i, 0], gain[i, 1], pose, axes)
+        elif near:
+            revolve_block(place, i, q, coordinate[i], gain[i, 0], gain[i, 1], pose, axes)
         else:
-            slide_block(place, i, value, pose, axes)
+            wrap_angles(q, coordinate[i], gain[i, 0], gain[i, 1], value)
+            revolve_block(place, i, value, 0, 1.0, 0.0, pose, axes)
     place_block(place, m, pose)
 
 
@@ -197,8 +217,8 @@ def jacobian_block(model, pose, axes, jacobian):
     for j in range(6 * model.free.shape[0] * L):
         jacobian[j] = 0.0
     for i in range(model.kind.shape[0]):
-        a = 6 * i * L
-        c = 6 * model.column[i] * L
+        a = at(i, 6)
+        c = at(model.column[i], 6)
         gain = model.gain[i, 0]
         if model.kind[i] == REVOLUTE:
             for lane in range(L):
@@ -215,9 +235,8 @@ def jacobian_block(model, pose, axes, jacobian):
                 jacobian[c + 4 * L + lane] += zy
                 jacobian[c + 5 * L + lane] += zz
         else:
-            for k in range(3):
-                for lane in range(L):
-                    jacobian[c + k * L + lane] += gain * axes[a + (3 + k) * L + lane]
+            for lane in range(3 * L):
+                jacobian[c + lane] += gain * axes[a + 3 * L + lane]
 
 
 @kernel
@@ -227,28 +246,28 @@ def turn_jacobian_block(pose, columns, reference, jacobian):
     Spatial: ``v + p × ω``; body: both parts in the axes of the frame.
     """
     L = LANES
-    for column in range(columns):
-        c = 6 * column * L
+    for c in range(columns):
+        column = jacobian[6 * c * L : 6 * (c + 1) * L]
         if reference == SPATIAL:
             for lane in range(L):
                 x = pose[9 * L + lane]
                 y = pose[10 * L + lane]
                 z = pose[11 * L + lane]
-                wx = jacobian[c + 3 * L + lane]
-                wy = jacobian[c + 4 * L + lane]
-                wz = jacobian[c + 5 * L + lane]
-                jacobian[c + lane] += y * wz - z * wy
-                jacobian[c + L + lane] += z * wx - x * wz
-                jacobian[c + 2 * L + lane] += x * wy - y * wx
+                wx = column[3 * L + lane]
+                wy = column[4 * L + lane]
+                wz = column[5 * L + lane]
+                column[lane] += y * wz - z * wy
+                column[L + lane] += z * wx - x * wz
+                column[2 * L + lane] += x * wy - y * wx
         elif reference == BODY:
             for h in (0, 3):
-                d = c + h * L
+                part = column[h * L : (h + 3) * L]
                 for lane in range(L):
-                    x = jacobian[d + lane]
-                    y = jacobian[d + L + lane]
-                    z = jacobian[d + 2 * L + lane]
+                    x = part[lane]
+                    y = part[L + lane]
+                    z = part[2 * L + lane]
                     for k in range(3):
-                        jacobian[d + k * L + lane] = (
+                        part[k * L + lane] = (
                             pose[k * L + lane] * x + pose[(3 + k) * L + lane] * y + pose[(6 + k) * L + lane] * z
                         )
 

@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .chain import REVOLUTE, joint_value_block, load_block
+from .chain import PRISMATIC, REVOLUTE, at, load_block, within_sincos, wrap_angles
 from .lanes import LANES, sincos
 
 
@@ -58,14 +58,14 @@ def carry_block(place, i, poses, parent, target):
     r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
     r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
     x, y, z = place[i, 9], place[i, 10], place[i, 11]
-    t = 12 * target * L
+    t = at(target, 12)
     if parent < 0:
         for k in range(12):
             value = place[i, k]
             for lane in range(L):
                 poses[t + k * L + lane] = value
         return
-    s = 12 * parent * L
+    s = at(parent, 12)
     for lane in range(L):
         for k in range(3):
             a0 = poses[s + 3 * k * L + lane]
@@ -79,12 +79,13 @@ def carry_block(place, i, poses, parent, target):
 
 
 @kernel
-def turn_block(value, poses, target):
-    """Rotate ``poses[target]`` by *value* about its own z."""
+def turn_block(q, coordinate, multiplier, offset, poses, target):
+    """Rotate ``poses[target]`` by ``multiplier * q[coordinate] + offset`` about its own z."""
     L = LANES
-    t = 12 * target * L
+    t = at(target, 12)
+    d = at(coordinate, 1)
     for lane in range(L):
-        s, c = sincos(value[lane])
+        s, c = sincos(multiplier * q[d + lane] + offset)
         for k in range(3):
             b0 = poses[t + 3 * k * L + lane]
             b1 = poses[t + (3 * k + 1) * L + lane]
@@ -93,27 +94,32 @@ def turn_block(value, poses, target):
 
 
 @kernel
-def shift_block(value, poses, target):
-    """Translate ``poses[target]`` by *value* along its own z."""
+def shift_block(q, coordinate, multiplier, offset, poses, target):
+    """Translate ``poses[target]`` by ``multiplier * q[coordinate] + offset`` along its own z."""
     L = LANES
-    t = 12 * target * L
+    t = at(target, 12)
+    d = at(coordinate, 1)
     for lane in range(L):
-        d = value[lane]
+        h = multiplier * q[d + lane] + offset
         for k in range(3):
-            poses[t + (9 + k) * L + lane] += d * poses[t + (3 * k + 2) * L + lane]
+            poses[t + (9 + k) * L + lane] += h * poses[t + (3 * k + 2) * L + lane]
 
 
 @kernel
 def tree_block(model, q, value, poses):
     """Moved frames of all joints, ``poses (12 * m * LANES)``, of ``q (n * LANES)``; *value* ``(LANES)`` is scratch."""
+    gain = model.gain
+    coordinate = model.coordinate
+    near = within_sincos(q, model)
     for i in range(model.kind.shape[0]):
-        revolute = model.kind[i] == REVOLUTE
-        joint_value_block(q, model.coordinate[i], model.gain[i, 0], model.gain[i, 1], revolute, value)
         carry_block(model.place, i, poses, model.parent[i], i)
-        if revolute:
-            turn_block(value, poses, i)
+        if model.kind[i] == PRISMATIC:
+            shift_block(q, coordinate[i], gain[i, 0], gain[i, 1], poses, i)
+        elif near:
+            turn_block(q, coordinate[i], gain[i, 0], gain[i, 1], poses, i)
         else:
-            shift_block(value, poses, i)
+            wrap_angles(q, coordinate[i], gain[i, 0], gain[i, 1], value)
+            turn_block(value, 0, 1.0, 0.0, poses, i)
 
 
 @kernel
