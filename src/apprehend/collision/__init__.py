@@ -1,5 +1,7 @@
 """Scenes, and collision of robots with themselves and with what stands around them."""
 
+from .model import Closest, CollisionModel, Touch
 from .scene import Box, Placed, RobotSource, Scene
+from .shapes import Convex
 
-__all__ = ["Box", "Placed", "RobotSource", "Scene"]
+__all__ = ["Box", "Closest", "CollisionModel", "Convex", "Placed", "RobotSource", "Scene", "Touch"]

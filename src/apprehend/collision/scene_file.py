@@ -22,7 +22,7 @@
                                             # cylinder = [radius, length], sphere = radius
     mass = 0.3                              # kg; or density in kg/m³
     pose = {xyz = [0.5, -0.2, 0.05], rpy_deg = [0, 0, 30]}
-    # or: rest = {on = "table", xy = [0.5, -0.2], yaw_deg = 30, choose = 0}
+    # or: rest = {on = "table", xy = [0.5, -0.2], yaw_deg = 30}      choose = 0: the most probable stable pose
 
     [task]
     pick = "mug"
@@ -296,8 +296,8 @@ def _rest(table: Table, body: Body, boxes: tuple[Box, ...]) -> Array:
         hint = suggestion(on, [b.name for b in boxes])
         raise DescriptionError(f"{rest.where}: there is no box named {on!r} in this scene.{hint}")
     x, y = rest.numbers("xy", 2)
-    choose = rest.values.get("choose", 0)
-    if isinstance(choose, bool) or not isinstance(choose, int):
+    choose = rest.values.get("choose")
+    if choose is not None and (isinstance(choose, bool) or not isinstance(choose, int)):
         raise rest.error("choose", "a whole number (0: the most probable stable pose)")
     yaw = rest.number("yaw_deg", 0.0) * DEGREE
     pose: Array = _at(rest.where, resting, body, float(x), float(y), box.top, yaw=yaw, choose=choose)
@@ -411,8 +411,9 @@ def rpy_matrix(rpy: Array) -> Array:
 def quaternion_matrix(q: Array) -> Array:
     """Rotation matrix of the unit quaternion (w, x, y, z)."""
     w, v = q[0], q[1:]
-    cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-    return np.eye(3) + 2.0 * (w * cross + cross @ cross)
+    cross: Array = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    R: Array = np.eye(3) + 2.0 * (w * cross + cross @ cross)
+    return R
 
 
 def matrix_quaternion(R: Array) -> Array:
@@ -425,5 +426,6 @@ def matrix_quaternion(R: Array) -> Array:
             [0.0, 0.0, 0.0, R[2, 2] - R[0, 0] - R[1, 1]],
         ]
     )
-    q = np.linalg.eigh(K, UPLO="U")[1][:, -1]
-    return q if q[0] >= 0.0 else -q
+    q: Array = np.linalg.eigh(K, UPLO="U")[1][:, -1]
+    q = np.array(q if q[0] >= 0.0 else -q)
+    return q

@@ -16,6 +16,9 @@ from .scene import AUTO, DEFAULT_HAND, Box, Placed, RobotSource, Scene, end_link
 if TYPE_CHECKING:
     from ..bodies import Body
 
+UPRIGHT = 0.1
+"""Largest angle in rad between a body's z and the vertical at which it counts as upright as it was modelled."""
+
 REACH_SAMPLES = 2000
 FLOOR = -0.75  # m; the table's top and the robot's base are at z = 0
 
@@ -31,9 +34,9 @@ def tabletop(
 ) -> Scene:
     """The scene of the main job: *robot* on a pedestal at the edge of a table whose top is z = 0.
 
-    The body (a `Body` or the name of a household object; "mug" by default) stands at *pose* (4, 4), by default in
-    its most probable stable pose at half of the arm's reach, to the right; *goal* (4, 4) is by default the same
-    posture to the left. *hand* is a name or path, None for a robot that needs none, or "auto": none where the arm's
+    The body (a `Body` or the name of a household object; "mug" by default) stands at *pose* (4, 4), by default at
+    half of the arm's reach to the right, at rest as `resting` chooses; *goal* (4, 4) is by default the same posture
+    to the left. *hand* is a name or path, None for a robot that needs none, or "auto": none where the arm's
     description has a hand of its own, else the default gripper.
     """
     from ..bodies import Body
@@ -81,22 +84,34 @@ def horizontal_reach(robot: Robot) -> float:
     return float(np.linalg.norm(tips[:, :2] - robot.base[:2, 3], axis=1).max())
 
 
-def resting(body: Body, x: float, y: float, z: float = 0.0, *, yaw: float = 0.0, choose: int = 0) -> Array:
+def resting(body: Body, x: float, y: float, z: float = 0.0, *, yaw: float = 0.0, choose: int | None = None) -> Array:
     """The pose (4, 4) of *body* that rests on the plane of height *z*, its centre of mass above (x, y).
 
-    *choose* counts the stable poses from the most probable one; *yaw* (rad) turns the body about the vertical.
+    *choose* counts the stable poses from the most probable one; None takes the pose in which the body's z points up
+    where that is stable, else the most probable one. With *yaw* = 0 (rad, about the vertical) the rest is the
+    smallest rotation that brings it about.
     """
     poses = body.stable_poses()
+    if choose is None:
+        ups = [pose.up[2] for pose in poses]
+        choose = int(np.argmax(ups)) if max(ups) > np.cos(UPRIGHT) else 0
     if not 0 <= choose < len(poses):
-        raise InputError(
-            f"body {body.name!r} has {len(poses)} stable poses; there is no pose {choose} (they count from 0)"
-        )
-    c, s = np.cos(yaw), np.sin(yaw)
+        raise InputError(f"body {body.name!r} has {len(poses)} stable poses, counted from 0; there is no pose {choose}")
     T = translation(0.0, 0.0, z)
-    T[:2, :2] = [[c, -s], [s, c]]
-    T = T @ poses[choose].pose
-    T[:2, 3] = np.array([x, y]) - (T[:3, :3] @ body.com)[:2]
+    c, s = np.cos(yaw), np.sin(yaw)
+    T[:3, :3] = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ raising(poses[choose].up)
+    T[:3, 3] += [x, y, 0.0] - T[:3, :3] @ body.com
+    T[2, 3] = z - (body.vertices @ T[2, :3]).min()
     return T
+
+
+def raising(up: Array) -> Array:
+    """The smallest rotation (3, 3) that turns the unit vector *up* into z."""
+    x, y, z = up
+    if z < -1.0 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    f = 1.0 / (1.0 + z)
+    return np.array([[1.0 - x * x * f, -x * y * f, -x], [-x * y * f, 1.0 - y * y * f, -y], [x, y, z]])
 
 
 def translation(x: float, y: float, z: float) -> Array:

@@ -84,7 +84,7 @@ def make_space(model, n):
         np.zeros((P, 2), np.int64),
         np.zeros(n),
         np.zeros(model.blocks.shape[0]),
-        np.zeros((QUEUE, 2)),
+        np.empty((QUEUE, 2)),
         pair,
     )
 
@@ -316,39 +316,48 @@ def edges_many(model, qa, qb, margin, resolution, start, stop, out, where):
 
 
 @kernel
-def nearest(model, space, out):
-    """Smallest signed distance over all pairs of the placed model; returns ``(distance, pair)``.
+def measure(model, p, space, out, best, within):
+    """Signed distance of pair *p* and whether ``out (9,)`` was written: only when it is below *best* and *within*.
 
-    ``out`` (9,): the witness points on both shapes and the unit normal from the second to the first, in the world.
+    ``out``: the witness points on both shapes and the unit normal from the second to the first, in the world.
     """
-    best, pair = 1e300, -1
+    enough = max(min(best, within), 0.0)
+    lower, _ = pair_gap(model, p, space, enough, -1.0, 1e-3)
+    if lower > enough:
+        return lower, False
+    a, b = model.pairs[p, 0], model.pairs[p, 1]
+    shape_pose(model, a, space)
+    shape_pose(model, b, space)
     s = space.pair
+    relative(space.shapes[a], space.shapes[b], s.rel)
+    for c in range(3):
+        s.axis[c] = space.axes[p, c]
+    s.hints[0], s.hints[1] = 0, 0
+    d = signed_distance(model.ints, model.floats, model.points, model.first, model.around, a, b, s.rel, s)
+    if d >= best:
+        return d, False
+    T = space.shapes[a]
+    for k in range(2):
+        for c in range(3):
+            out[3 * k + c] = (
+                T[3 * c] * s.near[k, 0] + T[3 * c + 1] * s.near[k, 1] + T[3 * c + 2] * s.near[k, 2] + T[9 + c]
+            )
+    for c in range(3):
+        out[6 + c] = T[3 * c] * s.axis[0] + T[3 * c + 1] * s.axis[1] + T[3 * c + 2] * s.axis[2]
+    return d, True
+
+
+@kernel
+def nearest(model, space, out):
+    """Smallest signed distance over all pairs of the placed model, its pair, and ``out (9,)`` as in `measure`."""
+    best, pair = 1e300, -1
     for block in range(model.blocks.shape[0]):
         if node_gap(model, block, space) >= best:
             continue
         for p in range(model.blocks[block, 2], model.blocks[block, 3]):
-            lower, _ = pair_gap(model, p, space, max(best, 0.0), -1.0, 1e-3)
-            if lower >= best and lower > 0.0:
-                continue
-            a, b = model.pairs[p, 0], model.pairs[p, 1]
-            shape_pose(model, a, space)
-            shape_pose(model, b, space)
-            relative(space.shapes[a], space.shapes[b], s.rel)
-            for c in range(3):
-                s.axis[c] = space.axes[p, c]
-            s.hints[0], s.hints[1] = 0, 0
-            d = signed_distance(model.ints, model.floats, model.points, model.first, model.around, a, b, s.rel, s)
-            if d < best:
+            d, written = measure(model, p, space, out, best, 1e300)
+            if written:
                 best, pair = d, p
-                T = space.shapes[a]
-                for c in range(3):
-                    out[c] = (
-                        T[3 * c] * s.near[0, 0] + T[3 * c + 1] * s.near[0, 1] + T[3 * c + 2] * s.near[0, 2] + T[9 + c]
-                    )
-                    out[3 + c] = (
-                        T[3 * c] * s.near[1, 0] + T[3 * c + 1] * s.near[1, 1] + T[3 * c + 2] * s.near[1, 2] + T[9 + c]
-                    )
-                    out[6 + c] = T[3 * c] * s.axis[0] + T[3 * c + 1] * s.axis[1] + T[3 * c + 2] * s.axis[2]
     return best, pair
 
 
@@ -377,3 +386,22 @@ def hits_of_blocks(model, q, margin, start, stop, hits):
                 if not lower > margin and upper <= margin:
                     hits[block] += 1
                     break
+
+
+@kernel
+def block_gaps(model, q, within, distance, out):
+    """Signed distance of every block at one ``q (n,)``: ``distance (B,)``, ``out (B, 9)`` as in `nearest`.
+
+    Blocks farther apart than *within* get a lower bound above it, and no points.
+    """
+    space = make_space(model, q.shape[0])
+    place(model, q, space, True)
+    for block in range(model.blocks.shape[0]):
+        distance[block] = node_gap(model, block, space)
+        if distance[block] > within:
+            continue
+        best = 1e300
+        for p in range(model.blocks[block, 2], model.blocks[block, 3]):
+            d, _ = measure(model, p, space, out[block], best, within)
+            best = min(best, d)
+        distance[block] = best

@@ -1,0 +1,177 @@
+"""The things that a collision model knows: links, attached bodies, obstacles; and which of them may touch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from ..errors import InputError
+from ..kernels.collide import CollideModel
+from ..kernels.tree import TreeModel
+from ..kinematics import Robot
+from ..robots.description import Description, JointType
+from .shapes import Convex, link_shapes, pack
+
+UNBOUNDED_TRAVEL = 100.0
+"""Travel in m that is assumed for a sliding joint without limits when the motion of what it carries is bounded."""
+
+Pair = frozenset[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """Something rigid with a name: its shapes, in the frame of the joint that carries it (−1: the world)."""
+
+    name: str
+    carrier: int
+    shapes: tuple[Convex, ...]
+    attached_to: str | None = None  # frame that an attached body moves with
+    pose: Array | None = None  # of an attached body in that frame
+
+
+def pair(a: str, b: str) -> Pair:
+    """The unordered pair of two names."""
+    return frozenset((a, b))
+
+
+def link_nodes(robot: Robot) -> tuple[Node, ...]:
+    """The links that have collision geometry."""
+    tree, nodes = robot.model, []
+    for f, name in enumerate(robot.frame_names):
+        shapes = link_shapes(robot.description.links[name])
+        if shapes:
+            place = matrix(tree.frame_place[f])
+            nodes.append(Node(name, int(tree.frame_joint[f]), tuple(shape.at(place) for shape in shapes)))
+    if not nodes:
+        raise InputError(f"robot {robot.name!r} has no collision geometry: nothing could be checked")
+    return tuple(nodes)
+
+
+def matrix(flat: Array) -> Array:
+    """A pose of 12 numbers (rotation row-major, translation) as (4, 4)."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = flat[:9].reshape(3, 3), flat[9:]
+    return T
+
+
+def ancestors(tree: TreeModel, joint: int) -> list[int]:
+    """The joint and those that carry it, innermost first."""
+    chain = []
+    while joint >= 0:
+        chain.append(joint)
+        joint = int(tree.parent[joint])
+    return chain
+
+
+def between(tree: TreeModel, a: int, b: int) -> list[int]:
+    """The joints whose motion moves carrier *a* against carrier *b*."""
+    up_a, up_b = ancestors(tree, a), ancestors(tree, b)
+    return [j for j in up_a if j not in up_b] + [j for j in up_b if j not in up_a]
+
+
+def neighbours(description: Description, shaped: set[str]) -> set[Pair]:
+    """Pairs of links with geometry that one moving joint connects, directly or through links without geometry."""
+    group = {description.root: description.root}  # link → first link of its rigid group
+    members: dict[str, list[str]] = {description.root: [description.root]}
+    for joint in description.joints:
+        group[joint.child] = group[joint.parent] if joint.type is JointType.FIXED else joint.child
+        members.setdefault(group[joint.child], []).append(joint.child)
+    pairs = set()
+    for joint in description.joints:
+        if joint.type is JointType.FIXED:
+            continue
+        sides = [[link] if link in shaped else members[group[link]] for link in (joint.parent, joint.child)]
+        pairs |= {pair(a, b) for a in sides[0] for b in sides[1] if a in shaped and b in shaped}
+    return pairs
+
+
+def linkages(tree: TreeModel, nodes: Sequence[Node]) -> set[Pair]:
+    """Pairs that move against each other by two or more joints coupled to one coordinate.
+
+    Such a mechanism (the fingers of a gripper, a four-bar linkage) is fixed by its maker; no plan can change it.
+    """
+    pairs = set()
+    for i, a in enumerate(nodes):
+        for b in nodes[:i]:
+            joints = between(tree, a.carrier, b.carrier)
+            if len(joints) >= 2 and len({int(tree.coordinate[j]) for j in joints}) == 1:
+                pairs.add(pair(a.name, b.name))
+    return pairs
+
+
+def can_meet(tree: TreeModel, a: Node, b: Node) -> bool:
+    """Whether two nodes move against each other at all."""
+    return a.carrier != b.carrier and bool(between(tree, a.carrier, b.carrier))
+
+
+def reach(tree: TreeModel, robot: Robot, node: Node) -> Array:
+    """How far any point of the node moves at most per rad or m of each joint's value, over all configurations (m,).
+
+    A revolute joint moves a point by its distance from the axis, which the lengths of the links in between bound.
+    """
+    out = np.zeros(len(tree.kind))
+    lower, upper = robot.limits.lower, robot.limits.upper
+    radius, across = 0.0, 0.0  # of the ball about the joint's origin that holds the node, and about its axis
+    for shape in node.shapes:
+        centre, r = shape.ball
+        radius = max(radius, float(np.linalg.norm(centre)) + r)
+        across = max(across, float(np.hypot(centre[0], centre[1])) + r)
+    for joint in ancestors(tree, node.carrier):
+        if tree.kind[joint] == 0:
+            out[joint] = across
+        else:
+            out[joint] = 1.0
+            c, (gain, offset) = tree.coordinate[joint], tree.gain[joint]
+            ends = np.abs(np.array([lower[c], upper[c]]) * gain + offset)
+            travel = float(ends.max()) if np.isfinite(ends).all() else UNBOUNDED_TRAVEL
+            radius += travel
+        x, y, z = tree.place[joint, 9:]
+        across = float(np.hypot(x, y)) + radius
+        radius += float(np.sqrt(x * x + y * y + z * z))
+    return out
+
+
+def node_ball(node: Node) -> Array:
+    """A sphere (centre, radius) that holds the node, in its carrier (Ritter's two passes over the shapes' spheres)."""
+    centres = np.array([shape.ball[0] for shape in node.shapes])
+    radii = np.array([shape.ball[1] for shape in node.shapes])
+    centre = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
+    radius = float((np.linalg.norm(centres - centre, axis=1) + radii).max())
+    return np.array([*centre, radius * (1.0 + 1e-12)])
+
+
+def compile_model(robot: Robot, nodes: Sequence[Node], blocks: Iterable[tuple[int, int]]) -> CollideModel:
+    """Arrays for the kernels; *blocks* are pairs of indices into *nodes*, in the order in which they are tested."""
+    tree = robot.model
+    shapes = [shape for node in nodes for shape in node.shapes]
+    ints, floats, points, first, around, half = pack(shapes)
+    start = np.cumsum([0] + [len(node.shapes) for node in nodes])
+    for k, node in enumerate(nodes):
+        ints[start[k] : start[k + 1], 3] = node.carrier
+    rows: list[tuple[int, int, int, int]] = []
+    pairs: list[tuple[int, int]] = []
+    common: list[list[bool]] = []
+    for a, b in blocks:
+        begin = len(pairs)
+        pairs += [(g, h) for g in range(start[a], start[a + 1]) for h in range(start[b], start[b + 1])]
+        rows.append((a, b, begin, len(pairs)))
+        both = set(ancestors(tree, nodes[a].carrier)) & set(ancestors(tree, nodes[b].carrier))
+        common.append([j in both for j in range(len(tree.kind))])
+    return CollideModel(
+        tree,
+        ints,
+        floats,
+        points,
+        first,
+        around,
+        half,
+        np.array([node.carrier for node in nodes], np.int64),
+        np.array([node_ball(node) for node in nodes]).reshape(-1, 4),
+        np.array([reach(tree, robot, node) for node in nodes]).reshape(len(nodes), len(tree.kind)),
+        np.array(common, np.uint8).reshape(len(rows), len(tree.kind)),
+        np.array(rows, np.int64).reshape(-1, 4),
+        np.array(pairs, np.int64).reshape(-1, 2),
+    )

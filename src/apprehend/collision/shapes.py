@@ -1,0 +1,228 @@
+"""Convex shapes for distance and collision, and how boxes, robot links and bodies are made of them."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, IntArray, as_pose, as_shaped, as_vector
+from ..errors import InputError
+from ..kernels.gjk import BOX, CYLINDER, HULL
+from ..robots import load_shape_mesh
+from ..robots.description import Link, Shape, ShapeKind
+
+FILLED = 0.85
+"""A mesh that fills this share of its convex hull is taken as the hull; below, it is split into convex pieces."""
+
+ROUND_OFF = 1e-9
+"""Bounds of shapes are enlarged by this share, so that rounding never makes them too small."""
+
+
+@dataclass(frozen=True, eq=False)
+class Convex:
+    """A convex core grown by a radius, at a pose in the frame of what carries it (a link, a body, or the world).
+
+    A sphere is a grown point and a capsule a grown segment; hulls are given by their vertices. Make one with `box`,
+    `sphere`, `capsule`, `cylinder` or `hull`.
+    """
+
+    kind: int
+    size: Array = field(default_factory=lambda: np.zeros(3))  # box: half extents; cylinder: radius, half length
+    radius: float = 0.0
+    points: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (V, 3) vertices of a hull in the shape's frame
+    faces: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  # (F, 3) of a hull, outward
+    pose: Array = field(default_factory=lambda: np.eye(4))
+
+    @staticmethod
+    def box(size: ArrayLike) -> Convex:
+        """A box of full extents (3,), centred."""
+        half = 0.5 * as_vector(size, "size", 3)
+        _positive("the size of a box", *half)
+        return Convex(BOX, half)
+
+    @staticmethod
+    def sphere(radius: float) -> Convex:
+        """A sphere about the origin."""
+        _positive("the radius of a sphere", radius)
+        return Convex(HULL, radius=float(radius), points=np.zeros((1, 3)))
+
+    @staticmethod
+    def capsule(radius: float, length: float) -> Convex:
+        """A capsule along z, centred; *length* is that of the cylindrical part."""
+        _positive("the radius of a capsule", radius)
+        if not (np.isfinite(length) and length >= 0.0):
+            raise InputError(f"the length of a capsule is {length}; expected 0 or more, in m")
+        return Convex(
+            HULL, radius=float(radius), points=np.array([[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]])
+        )
+
+    @staticmethod
+    def cylinder(radius: float, length: float) -> Convex:
+        """A cylinder along z, centred."""
+        _positive("radius and length of a cylinder", radius, length)
+        return Convex(CYLINDER, np.array([radius, 0.5 * length, 0.0]))
+
+    @staticmethod
+    def hull(vertices: ArrayLike, radius: float = 0.0) -> Convex:
+        """The convex hull of ``(V, 3)`` points, grown by *radius*; flat sets and single points are allowed."""
+        points = as_shaped(vertices, "vertices", 3)
+        if points.ndim != 2 or not len(points):
+            raise InputError(f"vertices have shape {points.shape}; expected (V, 3) with at least one point")
+        if not (np.isfinite(radius) and radius >= 0.0):
+            raise InputError(f"the radius of a hull is {radius}; expected 0 or more, in m")
+        turn, centre = _box_frame(points)
+        local = (points - centre) @ turn
+        kept, faces = _hull(local)
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = turn, centre
+        return Convex(HULL, radius=float(radius), points=np.ascontiguousarray(local[kept]), faces=faces, pose=pose)
+
+    def at(self, pose: ArrayLike) -> Convex:
+        """The same shape carried along by *pose* (4, 4): ``pose @ self.pose``."""
+        return replace(self, pose=as_pose(pose, "pose") @ self.pose)
+
+    @functools.cached_property
+    def half(self) -> Array:
+        """Half extents (3,) of the box about the shape's origin, in the shape's frame, that holds it."""
+        if self.kind == BOX:
+            half = self.size
+        elif self.kind == CYLINDER:
+            half = np.array([self.size[0], self.size[0], self.size[1]])
+        else:
+            half = np.abs(self.points).max(axis=0)
+        return half * (1.0 + ROUND_OFF) + self.radius
+
+    @functools.cached_property
+    def ball(self) -> tuple[Array, float]:
+        """Centre (3,) and radius of a sphere that holds the shape, in the carrier's frame."""
+        core = np.linalg.norm(self.points, axis=1).max() if self.kind == HULL else np.linalg.norm(self.half)
+        if self.kind == CYLINDER:
+            core = float(np.hypot(self.size[0], self.size[1]))
+        return self.pose[:3, 3], float(core) * (1.0 + ROUND_OFF) + self.radius
+
+    @functools.cached_property
+    def neighbours(self) -> list[list[int]]:
+        """For every vertex of a hull, the vertices that share an edge with it."""
+        if not len(self.faces):  # a flat set: everything is near everything
+            return [[i for i in range(len(self.points)) if i != k] for k in range(len(self.points))]
+        sets: list[set[int]] = [set() for _ in self.points]
+        for i, j, k in self.faces:
+            sets[i] |= {int(j), int(k)}
+            sets[j] |= {int(i), int(k)}
+            sets[k] |= {int(i), int(j)}
+        return [sorted(s) for s in sets]
+
+
+def _positive(what: str, *values: float) -> None:
+    if not all(np.isfinite(v) and v > 0.0 for v in values):
+        raise InputError(f"{what} must be positive, in m; got {', '.join(f'{v:g}' for v in values)}")
+
+
+def _box_frame(points: Array) -> tuple[Array, Array]:
+    """A tight oriented box: rotation (3, 3) and centre (3,); principal axes or the given ones, whichever is smaller."""
+    best: tuple[float, Array, Array] | None = None
+    spread = points - points.mean(axis=0)
+    for turn in (np.eye(3), np.linalg.svd(spread, full_matrices=True)[2].T):
+        if np.linalg.det(turn) < 0.0:
+            turn = turn * np.array([1.0, 1.0, -1.0])
+        local = points @ turn
+        low, high = local.min(axis=0), local.max(axis=0)
+        volume = float(np.prod(high - low + 1e-6))
+        if best is None or volume < 0.999 * best[0]:
+            best = (volume, turn, turn @ (0.5 * (low + high)))
+    assert best is not None
+    return best[1], best[2]
+
+
+def _hull(points: Array) -> tuple[IntArray, IntArray]:
+    """Indices of the vertices of the convex hull and its faces among them; flat sets keep all points, without faces."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    points_kept = np.unique(points, axis=0, return_index=True)[1]
+    if len(points_kept) >= 4:
+        try:
+            hull = ConvexHull(points[points_kept])
+        except QhullError:
+            return points_kept, np.zeros((0, 3), np.int64)
+        number = np.full(len(points_kept), -1)
+        number[hull.vertices] = np.arange(len(hull.vertices))
+        faces = number[hull.simplices].astype(np.int64)
+        kept: IntArray = points_kept[hull.vertices]
+        p = points[kept][faces]
+        inward = np.einsum("fi,fi->f", np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), hull.equations[:, :3]) < 0.0
+        faces[inward] = faces[inward][:, ::-1]
+        return kept, faces
+    return points_kept, np.zeros((0, 3), np.int64)
+
+
+def hulls(pieces: Iterable[tuple[Array, IntArray]]) -> tuple[Convex, ...]:
+    """Convex pieces ``(vertices, faces)`` as shapes."""
+    return tuple(Convex.hull(vertices) for vertices, _ in pieces)
+
+
+def mesh_hulls(vertices: Array, faces: IntArray) -> tuple[Convex, ...]:
+    """A mesh as convex shapes: its hull where the mesh fills it (`FILLED`), else convex pieces."""
+    hull = Convex.hull(vertices)
+    filled, whole = _volume(vertices, faces), _volume(hull.points, hull.faces)
+    if whole <= 0.0 or not 0.0 < filled < FILLED * whole:
+        return (hull,)
+    from ..bodies.convex import decompose
+    from ..bodies.topology import is_closed
+
+    return hulls(decompose(vertices, faces, is_closed(faces)).pieces)
+
+
+def _volume(vertices: Array, faces: IntArray) -> float:
+    corners = vertices[faces] - vertices.mean(axis=0)
+    return float(np.einsum("fi,fi->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0)
+
+
+def link_shapes(link: Link) -> tuple[Convex, ...]:
+    """The collision geometry of a link, in the link's frame."""
+    return tuple(convex for shape in link.collisions for convex in shape_convexes(shape))
+
+
+def shape_convexes(shape: Shape) -> tuple[Convex, ...]:
+    """One piece of collision geometry as convex shapes, in the link's frame."""
+    if shape.kind is ShapeKind.MESH:
+        return tuple(convex.at(shape.pose) for convex in mesh_hulls(*load_shape_mesh(shape)))
+    if shape.kind is ShapeKind.BOX:
+        return (Convex.box(shape.size).at(shape.pose),)
+    if shape.kind is ShapeKind.SPHERE:
+        return (Convex.sphere(shape.size[0]).at(shape.pose),)
+    if shape.kind is ShapeKind.CYLINDER:
+        return (Convex.cylinder(shape.size[0], shape.size[1]).at(shape.pose),)
+    return (Convex.capsule(shape.size[0], shape.size[1]).at(shape.pose),)
+
+
+def pack(shapes: Sequence[Convex]) -> tuple[IntArray, Array, Array, IntArray, IntArray, Array]:
+    """Arrays for kernels (layout: `apprehend.kernels.gjk`): ints, floats, points, first, around, half."""
+    ints = np.zeros((len(shapes), 4), np.int64)
+    floats = np.zeros((len(shapes), 20))
+    half = np.zeros((len(shapes), 3))
+    points: list[Array] = [np.zeros((0, 3))]
+    first, around = [0], []
+    count = 0
+    for g, shape in enumerate(shapes):
+        ints[g] = shape.kind, count, len(shape.points), -1
+        centre, reach = shape.ball
+        floats[g, :3], floats[g, 3], floats[g, 4:7], floats[g, 7] = shape.size, shape.radius, centre, reach
+        floats[g, 8:17], floats[g, 17:20] = shape.pose[:3, :3].ravel(), shape.pose[:3, 3]
+        half[g] = shape.half
+        points.append(shape.points)
+        count += len(shape.points)
+        for near in shape.neighbours:
+            around += near
+            first.append(len(around))
+    return (
+        ints,
+        floats,
+        np.concatenate(points),
+        np.array(first, np.int64),
+        np.array(around, np.int64),
+        half,
+    )
