@@ -20,7 +20,7 @@ from .description import (
     ShapeKind,
 )
 from .load import load_description
-from .meshes import load_shape_mesh, read_mesh
+from .meshes import link_surface, load_shape_mesh, read_mesh, shape_surface
 from .srdf import Semantics, read_srdf
 from .urdf import parse_urdf, read_urdf
 
@@ -38,6 +38,7 @@ __all__ = [
     "ShapeKind",
     "attach",
     "catalogue",
+    "link_surface",
     "load_description",
     "load_shape_mesh",
     "parse_urdf",
@@ -45,6 +46,7 @@ __all__ = [
     "read_srdf",
     "read_urdf",
     "renamed",
+    "shape_surface",
     "subtree",
     "without",
 ]

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..errors import MeshError
-from .description import Shape, ShapeKind
+from .description import Link, Shape, ShapeKind
 
 MAX_BYTES = 512 * 1024 * 1024
 """Largest mesh file that is read."""
@@ -72,3 +72,38 @@ def _refuse_entities(data: bytes, path: Path) -> None:
     head = data.replace(b"\0", b"").upper()
     if b"<!DOCTYPE" in head or b"<!ENTITY" in head:
         raise MeshError(f"mesh {path} declares a DOCTYPE or entities, which is refused; remove the declaration")
+
+
+def shape_surface(shape: Shape, segments: int = 32) -> tuple[Array, IntArray]:
+    """The surface of any shape as triangles in the frame of its *link* (``shape.pose`` applied), in metres.
+
+    Round shapes are approximated from inside with *segments* around the axis.
+    """
+    import trimesh
+
+    if shape.kind is ShapeKind.MESH:
+        vertices, faces = load_shape_mesh(shape)
+    else:
+        if shape.kind is ShapeKind.BOX:
+            made = trimesh.creation.box(extents=shape.size)
+        elif shape.kind is ShapeKind.SPHERE:
+            made = trimesh.creation.icosphere(subdivisions=3, radius=shape.size[0])
+        elif shape.kind is ShapeKind.CYLINDER:
+            made = trimesh.creation.cylinder(radius=shape.size[0], height=shape.size[1], sections=segments)
+        else:
+            count = (segments, segments)
+            made = trimesh.creation.capsule(radius=shape.size[0], height=shape.size[1], count=count)
+            made.apply_translation(-made.bounds.mean(axis=0))
+        vertices = np.asarray(made.vertices, dtype=np.float64)
+        faces = np.asarray(made.faces, dtype=np.int64)
+    return vertices @ shape.pose[:3, :3].T + shape.pose[:3, 3], faces
+
+
+def link_surface(link: Link, *, visual: bool = False) -> tuple[Array, IntArray]:
+    """All collision (or visual) shapes of *link* as one set of triangles in its frame; empty where there are none."""
+    parts = [shape_surface(s) for s in (link.visuals if visual else link.collisions)]
+    if not parts:
+        return np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
+    starts = np.cumsum([0, *(len(v) for v, _ in parts[:-1])])
+    faces = [f + start for (_, f), start in zip(parts, starts, strict=True)]
+    return np.concatenate([v for v, _ in parts]), np.concatenate(faces)
