@@ -1,1 +1,21 @@
-"""sim."""
+"""The scene in motion, in the physics engine MuJoCo: world, contacts, controllers, cameras.
+
+>>> world = World(scene)                                        # doctest: +SKIP
+>>> arm, gripper = JointController(world, coordinates), Gripper(world, scene.hand)
+>>> arm.follow(world, motion)
+>>> world.run(motion.duration, arm, gripper)
+>>> grip(world, gripper, 20.0, arm).require_success()
+"""
+
+from .contacts import ContactTable, Touch
+from .control import JointController, Load, Saturation
+from .gripper import Gripper, GripResult, GripStatus, JawState, grip
+from .model import Plant, build
+from .physics import Physics
+from .record import Recording
+from .world import Controller, SettleResult, SettleStatus, World
+
+__all__ = [
+    "ContactTable", "Controller", "Gripper", "GripResult", "GripStatus", "JawState", "JointController", "Load",
+    "Physics", "Plant", "Recording", "Saturation", "SettleResult", "SettleStatus", "Touch", "World", "build", "grip",
+]  # fmt: skip
