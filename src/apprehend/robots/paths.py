@@ -69,33 +69,45 @@ class MeshPaths:
         if scheme in ("package", "model"):
             package, _, inner = rest.lstrip("/").partition("/")
             roots = self._package_folders(package)
-            if not roots:
-                raise MeshError(
-                    f"{where}: mesh {name!r}: no folder of the package {package!r} was found; "
-                    f"pass packages={{{package!r}: folder}}"
-                )
-            paths = [self._inside(root / inner, root, name, where) for root in roots]
+            candidates = [(root / inner, (root, *self.allowed)) for root in roots]
         elif scheme in ("", "file"):
-            path = Path(rest)
-            if path.is_absolute():
-                paths = [self._allowed(path, name, where)]
-            else:
-                paths = [self._allowed(base / path, name, where) for base in (self.folder, *self.folders)]
+            inner, package = rest, ""
+            allowed = (*self.allowed, *shared_folders())
+            candidates = [(base / rest, allowed) for base in (self.folder, *self.folders)]
         else:
             raise DescriptionError(
                 f"{where}: mesh {name!r}: the scheme {scheme}:// is not read; expected package:// or a file"
             )
-        if paths[0].suffix.lower() not in MESH_SUFFIXES:
-            raise MeshError(f"{where}: mesh {name!r}: files of type {paths[0].suffix or 'none'!r} are not read; "
-                            f"expected one of {', '.join(MESH_SUFFIXES)}")  # fmt: skip
-        for path in paths:
-            if path.is_file():
-                return path
-        tried = ", ".join(str(p) for p in paths)
+        candidates += [(folder / Path(inner).name, tuple(self.allowed)) for folder in self.folders]
+        if not candidates:
+            raise MeshError(
+                f"{where}: mesh {name!r}: no folder of the package {package!r} was found; "
+                f"pass packages={{{package!r}: folder}}, or meshes='ignore' to load without geometry"
+            )
+        refused: Path | None = None
+        for path, allowed in candidates:
+            real = path.resolve()
+            if not any(real.is_relative_to(a) for a in allowed):
+                refused = refused or real
+            elif real.is_file():
+                return self._readable(real, name, where)
+        if refused is not None:
+            raise DescriptionError(
+                f"{where}: mesh {name!r} is {refused}, outside the allowed folders "
+                f"({', '.join(str(a) for a in candidates[0][1])}); refused. "
+                "If it is meant, pass packages=folder of the meshes"
+            )
+        tried = ", ".join(dict.fromkeys(str(path.resolve()) for path, _ in candidates))
         raise MeshError(
             f"{where}: mesh {name!r} does not exist (looked for {tried}); "
             "pass packages=folder of the meshes, or meshes='ignore' to load without geometry"
         )
+
+    def _readable(self, path: Path, name: str, where: str) -> Path:
+        if path.suffix.lower() not in MESH_SUFFIXES:
+            raise MeshError(f"{where}: mesh {name!r}: files of type {path.suffix or 'none'!r} are not read; "
+                            f"expected one of {', '.join(MESH_SUFFIXES)}")  # fmt: skip
+        return path
 
     def _package_folders(self, package: str) -> list[Path]:
         if package in self.named:
@@ -112,21 +124,3 @@ class MeshPaths:
             if package not in ("", ".", "..") and candidate.is_dir() and candidate.resolve() not in found:
                 found.append(candidate.resolve())
         return found
-
-    def _inside(self, path: Path, root: Path, name: str, where: str) -> Path:
-        real = path.resolve()
-        if not real.is_relative_to(root) and not any(real.is_relative_to(a) for a in self.allowed):
-            raise DescriptionError(f"{where}: mesh {name!r} leaves its package folder {root}; refused")
-        return real
-
-    def _allowed(self, path: Path, name: str, where: str) -> Path:
-        real = path.resolve()
-        if any(real.is_relative_to(a) for a in self.allowed):
-            return real
-        if any(real.is_relative_to(s) for s in shared_folders()):
-            return real
-        allowed = ", ".join(str(a) for a in self.allowed)
-        raise DescriptionError(
-            f"{where}: mesh {name!r} is {real}, outside the allowed folders ({allowed}); refused. "
-            "If it is meant, pass packages=folder of the meshes"
-        )
