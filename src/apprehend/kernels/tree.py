@@ -209,3 +209,40 @@ def frames_single(model, q, out):
             out[f, 3, k] = 0.0
         out[f, 3, 3] = 1.0
     return bad
+
+
+@kernel
+def centers_of_mass(model, q, start, stop, out):
+    """Centres of mass ``out (N, 3)`` in the world of rows start … stop of ``q (N, n)``; the first bad row, or −1."""
+    L = LANES
+    m = model.kind.shape[0]
+    buffer = np.empty(q.shape[1] * L)
+    value = np.empty(L)
+    poses = np.empty(12 * m * L)
+    total = np.empty(3 * L)
+    inertia = model.inertia
+    mass = inertia[:, 0].sum()
+    bad = -1
+    for first in range(start, stop, L):
+        row = load_block(q, first, stop, buffer)
+        if row >= 0 and bad < 0:
+            bad = row
+        tree_block(model, buffer, value, poses)
+        for k in range(3):
+            for lane in range(L):
+                total[k * L + lane] = inertia[m, 1 + k]
+        for i in range(m):
+            t = at(i, 12)
+            w, x, y, z = inertia[i, 0], inertia[i, 1], inertia[i, 2], inertia[i, 3]
+            for lane in range(L):
+                for k in range(3):
+                    total[k * L + lane] += (
+                        w * poses[t + (9 + k) * L + lane]
+                        + x * poses[t + 3 * k * L + lane]
+                        + y * poses[t + (3 * k + 1) * L + lane]
+                        + z * poses[t + (3 * k + 2) * L + lane]
+                    )
+        for lane in range(min(L, stop - first)):
+            for k in range(3):
+                out[first + lane, k] = total[k * L + lane] / mass
+    return bad

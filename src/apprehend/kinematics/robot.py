@@ -18,8 +18,8 @@ from ..kernels import chain as chain_kernels
 from ..kernels import tree as tree_kernels
 from ..kernels.chain import ChainModel
 from ..kernels.tree import TreeModel
-from ..parallel import over_ranges
 from ..robots.description import Description, Joint, JointType
+from . import dynamics
 from .model import chain_model, frame_names, tree_model
 
 REFERENCES = ("spatial", "body", "mixed")
@@ -237,6 +237,67 @@ class Robot:
         self._batch(lambda a, b: chain_kernels.chain_jacobians(chain, rows, a, b, kind, J, T), q, count)
         return J.reshape(*q.shape[:-1], 6, self.n), T.reshape(*q.shape[:-1], 4, 4) if poses else T
 
+    # dynamics ---------------------------------------------------------------------------------------------------
+
+    def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike | None = None, qdd: ArrayLike | None = None) -> Array:
+        """Joint torques (forces of prismatic joints) τ = M(q) q̈ + C(q, q̇) q̇ + g(q), ``(..., n)``.
+
+        q, q̇, q̈ broadcast; absent ones are zero. Recursive Newton–Euler; rotor inertias (``armature``) are included,
+        joint friction and damping are not.
+        """
+        shape, rows = self._read_rows(q=q, qd=qd, qdd=qdd)
+        out = np.empty((math.prod(shape), self.n))
+        bad = dynamics.inverse_dynamics(self.model, rows[0], rows[1], rows[2], out)
+        if bad >= 0:
+            self._refuse_one(bad % 4 - 1, q=q, qd=qd, qdd=qdd)
+        return out.reshape(*shape, self.n)
+
+    def gravity(self, q: ArrayLike) -> Array:
+        """Torques g(q) that hold the robot still against gravity, ``(..., n)``."""
+        return self.inverse_dynamics(q)
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """Joint-space inertia M(q), ``(..., n, n)``, symmetric (composite rigid bodies)."""
+        q = self._read(q)
+        count = math.prod(q.shape[:-1])
+        out = np.empty((count, self.n, self.n))
+        if dynamics.mass_matrix(self.model, q.reshape(count, self.n), out) >= 0:
+            self._refuse(q)
+        return out.reshape(*q.shape[:-1], self.n, self.n)
+
+    def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
+        """Accelerations q̈ = M(q)⁻¹ (τ − C(q, q̇) q̇ − g(q)), ``(..., n)``.
+
+        Raises `InputError` if the mass matrix is singular: a joint that moves no inertia.
+        """
+        shape, rows = self._read_rows(q=q, qd=qd, tau=tau)
+        out = np.empty((math.prod(shape), self.n))
+        bad, row, coordinate = dynamics.forward_dynamics(self.model, rows[0], rows[1], rows[2], out)
+        if bad >= 0:
+            self._refuse_one(bad % 4 - 1, q=q, qd=qd, tau=tau)
+        if row >= 0:
+            raise InputError(
+                f"robot {self.name!r}: the mass matrix is singular at joint {self.joint_names[coordinate]!r}: the "
+                "links that it moves have no inertia of their own; give them one, or the joint an armature"
+            )
+        return out.reshape(*shape, self.n)
+
+    def com(self, q: ArrayLike) -> Array:
+        """Centre of mass of the whole robot in the world, ``(..., 3)``; its mass is `mass`."""
+        if self.mass <= 0.0:
+            raise InputError(f"robot {self.name!r} has no mass: its description gives no link an inertia")
+        q = self._read(q)
+        count = math.prod(q.shape[:-1])
+        out = np.empty((count, 3))
+        if dynamics.center_of_mass(self.model, q.reshape(count, self.n), out) >= 0:
+            self._refuse(q)
+        return out.reshape(*q.shape[:-1], 3)
+
+    @cached_property
+    def mass(self) -> float:
+        """Mass of all links in kg."""
+        return float(self.model.inertia[:, 0].sum())
+
     # plumbing ---------------------------------------------------------------------------------------------------
 
     def _read(self, value: ArrayLike, name: str = "q") -> Array:
@@ -250,20 +311,35 @@ class Robot:
             raise InputError(f"{name} has shape {array.shape}; expected (..., {self.n}) for the joints {joints}")
         return array if array.flags.writeable else array.copy()
 
+    def _read_rows(self, **values: ArrayLike | None) -> tuple[tuple[int, ...], list[Array]]:
+        """Broadcast joint vectors against each other: their batch shape, and each as rows ``(N, n)``; absent: none."""
+        given = {name: self._read(value, name) for name, value in values.items() if value is not None}
+        shapes = {name: array.shape[:-1] for name, array in given.items()}
+        try:
+            shape = np.broadcast_shapes(*shapes.values())
+        except ValueError:
+            told = ", ".join(f"{name} {array.shape}" for name, array in given.items())
+            raise InputError(f"the shapes of {told} do not broadcast") from None
+        rows = []
+        for name in values:
+            if name in given:
+                spread = np.ascontiguousarray(np.broadcast_to(given[name], (*shape, self.n)))
+                rows.append(self._read(spread.reshape(math.prod(shape), self.n)))
+            else:
+                rows.append(dynamics.NONE)
+        return shape, rows
+
+    def _refuse_one(self, which: int, **values: ArrayLike | None) -> None:
+        """Raise `InputError` for the input that a kernel found not finite."""
+        name, value = list(values.items())[which]
+        as_shaped(value if value is not None else 0.0, name, self.n)
+
     def _refuse(self, q: Array, name: str = "q") -> None:
         as_shaped(q, name, self.n)
 
     def _batch(self, work: Callable[[int, int], int], q: Array, count: int, name: str = "q") -> None:
         """Run *work* over the rows of a batch; it returns the first row that is not finite, or −1."""
-        bad: list[int] = []
-
-        def run(start: int, stop: int) -> None:
-            row = work(start, stop)
-            if row >= 0:
-                bad.append(row)
-
-        over_ranges(run, count, GRAIN)
-        if bad:
+        if dynamics.each_range(work, count, GRAIN) >= 0:
             self._refuse(q, name)
 
     def __repr__(self) -> str:
