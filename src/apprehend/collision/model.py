@@ -339,7 +339,7 @@ class CollisionModel:
             raise InputError("there is no pair of things that could collide, so there is no distance")
         if len(rows):
             over_ranges(lambda a, b: collide.distance_many(model, rows, a, b, distance, number, out), len(rows), GRAIN)
-        names = tuple(self._names_of(int(p)) for p in number)
+        names = tuple(self.names_of(int(p)) for p in number)
         points = out[:, :6].reshape(*shape, 2, 3)
         return Closest(distance.reshape(shape), points, out[:, 6:].reshape(*shape, 3), names)
 
@@ -358,7 +358,8 @@ class CollisionModel:
         ]
         return tuple(sorted(touching, key=lambda touch: touch.distance))
 
-    def _names_of(self, number: int) -> tuple[str, str]:
+    def names_of(self, number: int) -> tuple[str, str]:
+        """The two names of a pair of shapes that `hits` answered."""
         model = self.compiled
         for a, b, begin, end in model.blocks:
             if begin <= number < end:

@@ -1,0 +1,208 @@
+"""Two trees that grow towards each other through the free configurations (RRT-Connect), and shorter ways along a path.
+
+Kuffner & LaValle 2000, *RRT-Connect*. Random numbers come in from the caller, so that the same generator gives the
+same path. A tree is ``nodes (C, n)`` with ``parent (C,)`` (−1: a root); ``count`` (2,) says how many are filled.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ._jit import kernel
+from .collide import edge_hit, make_space, place
+
+CONNECTED = 1
+FULL = 2
+MORE = 0
+
+
+@kernel
+def nearest_node(nodes, count, q):
+    """The row of ``nodes[:count]`` nearest to *q*, and its distance."""
+    best, row = 1e300, 0
+    for i in range(count):
+        d = 0.0
+        for j in range(q.shape[0]):
+            e = nodes[i, j] - q[j]
+            d += e * e
+        if d < best:
+            best = d
+            row = i
+    return row, math.sqrt(best)
+
+
+@kernel
+def extend(model, nodes, parent, count, q, stride, margin, resolution, space, greedy):
+    """Grow a tree towards *q* by steps of at most *stride*: one, or (*greedy*) as many as are free.
+
+    Returns ``(new count, reached)``.
+    """
+    n = q.shape[0]
+    row, left = nearest_node(nodes, count, q)
+    while count < nodes.shape[0]:
+        if left == 0.0:  # there already: once more, so that the last node is the one reached
+            for j in range(n):
+                nodes[count, j] = q[j]
+            parent[count] = row
+            return count + 1, True
+        share = min(1.0, stride / left)
+        for j in range(n):
+            nodes[count, j] = q[j] if share == 1.0 else nodes[row, j] + share * (q[j] - nodes[row, j])
+        hit, _ = edge_hit(model, nodes[row], nodes[count], margin, resolution, space)
+        if hit >= 0:
+            return count, False
+        parent[count] = row
+        row = count
+        count += 1
+        left -= share * left
+        if share == 1.0:
+            return count, True
+        if not greedy:
+            return count, False
+    return count, False
+
+
+@kernel
+def grow(model, nodes_a, parent_a, nodes_b, parent_b, count, samples, turn, stride, margin, resolution):
+    """Grow both trees with the configurations of ``samples (S, n)``; *turn* says which tree is first.
+
+    Returns ``(status, samples used)``; when connected, the last node of each tree is the same configuration.
+    """
+    space = make_space(model, samples.shape[1])
+    place(model, samples[0], space, True)
+    for s in range(samples.shape[0]):
+        first = (turn + s) % 2 == 0
+        before = count[0] if first else count[1]
+        if first:
+            count[0], _ = extend(
+                model, nodes_a, parent_a, count[0], samples[s], stride, margin, resolution, space, False
+            )
+            after = count[0]
+        else:
+            count[1], _ = extend(
+                model, nodes_b, parent_b, count[1], samples[s], stride, margin, resolution, space, False
+            )
+            after = count[1]
+        if after > before:
+            if first:
+                count[1], reached = extend(
+                    model, nodes_b, parent_b, count[1], nodes_a[after - 1], stride, margin, resolution, space, True
+                )
+            else:
+                count[0], reached = extend(
+                    model, nodes_a, parent_a, count[0], nodes_b[after - 1], stride, margin, resolution, space, True
+                )
+            if reached:
+                return CONNECTED, s + 1
+        if count[0] >= nodes_a.shape[0] or count[1] >= nodes_b.shape[0]:
+            return FULL, s + 1
+    return MORE, samples.shape[0]
+
+
+@kernel
+def first_direct(model, start, goals, order, margin, resolution):
+    """The first goal in *order* that a straight motion from *start* reaches, or −1."""
+    space = make_space(model, start.shape[0])
+    place(model, start, space, True)
+    for g in order:
+        hit, _ = edge_hit(model, start, goals[g], margin, resolution, space)
+        if hit < 0:
+            return g
+    return -1
+
+
+@kernel
+def length(path, a, b):
+    """Length of the polyline from vertex *a* to vertex *b*."""
+    total = 0.0
+    for i in range(a, b):
+        d = 0.0
+        for j in range(path.shape[1]):
+            e = path[i + 1, j] - path[i, j]
+            d += e * e
+        total += math.sqrt(d)
+    return total
+
+
+@kernel
+def point_at(path, count, s, out):
+    """The point at arc length *s*; returns the vertex before it."""
+    for i in range(count - 1):
+        d = length(path, i, i + 1)
+        if s <= d or i == count - 2:
+            t = min(s / d, 1.0) if d > 0.0 else 0.0
+            for j in range(path.shape[1]):
+                out[j] = path[i, j] + t * (path[i + 1, j] - path[i, j])
+            return i
+        s -= d
+    return 0
+
+
+@kernel
+def skip_vertices(model, path, count, margin, resolution, space):
+    """Drop vertices that a straight motion can pass by, the farthest leaps first; returns the new count."""
+    n = path.shape[1]
+    i = 0
+    while i < count - 2:
+        k = count - 1
+        while k > i + 1:
+            hit, _ = edge_hit(model, path[i], path[k], margin, resolution, space)
+            if hit < 0:
+                break
+            k -= 1
+        gap = k - i - 1
+        if gap > 0:
+            for r in range(i + 1, count - gap):
+                for j in range(n):
+                    path[r, j] = path[r + gap, j]
+            count -= gap
+        i += 1
+    return count
+
+
+@kernel
+def shortcut(model, path, count, samples, margin, resolution):
+    """Shorten ``path (C, n)`` of *count* vertices in place with pairs of random places ``samples (S, 2)`` in 0 … 1.
+
+    Vertices that can be passed by go first; then straight motions between two random places on the path replace what
+    lies between where they are free and shorter (Geraerts & Overmars 2007). Returns the new count.
+    """
+    n = path.shape[1]
+    space = make_space(model, n)
+    place(model, path[0], space, True)
+    count = skip_vertices(model, path, count, margin, resolution, space)
+    a, b = np.empty(n), np.empty(n)
+    rest = np.empty_like(path)
+    for s in range(samples.shape[0]):
+        if count < 3 or count + 2 > path.shape[0]:
+            break
+        total = length(path, 0, count - 1)
+        low = min(samples[s, 0], samples[s, 1]) * total
+        high = max(samples[s, 0], samples[s, 1]) * total
+        i = point_at(path, count, low, a)
+        k = point_at(path, count, high, b)
+        if i == k:
+            continue
+        d = 0.0
+        for j in range(n):
+            d += (b[j] - a[j]) ** 2
+        if math.sqrt(d) > (high - low) * (1.0 - 1e-3):
+            continue
+        hit, _ = edge_hit(model, a, b, margin, resolution, space)
+        if hit >= 0:
+            continue
+        # vertices 0 … i, a, b, k + 1 … end
+        tail = count - (k + 1)
+        for r in range(tail):
+            for j in range(n):
+                rest[r, j] = path[k + 1 + r, j]
+        for j in range(n):
+            path[i + 1, j] = a[j]
+            path[i + 2, j] = b[j]
+        for r in range(tail):
+            for j in range(n):
+                path[i + 3 + r, j] = rest[r, j]
+        count = i + 3 + tail
+    return skip_vertices(model, path, count, margin, resolution, space)
