@@ -1,7 +1,8 @@
 """Bodies: objects to be handled, from mesh files or generated, with mass, friction, rest poses and convex pieces."""
 
 from .body import ASSUMED_DENSITY, ROUGHNESS, Body
+from .household import HOUSEHOLD
 from .load import FORMATS, UNITS
 from .rest import RestPose
 
-__all__ = ["ASSUMED_DENSITY", "FORMATS", "ROUGHNESS", "UNITS", "Body", "RestPose"]
+__all__ = ["ASSUMED_DENSITY", "FORMATS", "HOUSEHOLD", "ROUGHNESS", "UNITS", "Body", "RestPose"]

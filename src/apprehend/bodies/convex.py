@@ -73,7 +73,7 @@ def _decompose(vertices: Array, faces: IntArray, closed: bool) -> ConvexParts:
     closed = closed and topology.is_closed(reduced[1])
     finest = float(np.clip(2.0 * CONCAVITY / float(np.ptp(vertices, axis=0).max()), FINEST, COARSEST))
     found = _coacd(*reduced, closed, COARSEST)
-    if len(found) <= MANY and finest < COARSEST:
+    if closed and len(found) <= MANY and finest < COARSEST:
         found = _coacd(*reduced, closed, finest)
     pieces = tuple(_thinned(hull(points)) for points in found if _solid_enough(points))
     if not pieces:
@@ -89,7 +89,7 @@ def _coacd(vertices: Array, faces: IntArray, closed: bool, threshold: float) -> 
         coacd.Mesh(vertices, faces),
         threshold=threshold,
         preprocess_mode="off" if closed else "on",
-        preprocess_resolution=40,
+        preprocess_resolution=30,
         resolution=1000,
         mcts_nodes=10,
         mcts_iterations=40,
@@ -176,17 +176,19 @@ def _beyond(points: Array, planes: Array) -> Array:
 def _farthest(points: Array, target: Array) -> float:
     """Largest distance of *points* from the triangles *target*.
 
-    The nearest triangle is looked for among those that own the nearest sample points, so the value is, if anything,
-    too large.
+    In a large mesh the nearest triangle is looked for among those that own the nearest sample points, so the value
+    is, if anything, too large.
     """
     from scipy.spatial import cKDTree
 
     if not len(points):
         return 0.0
+    if len(target) <= 100:
+        return float(np.sqrt(point_triangle_squared(points[:, None, :], target[None]).min(axis=1).max()))
     probes, owner = _spread(target, 5 * SAMPLES, np.random.default_rng(1))
     probes = np.vstack([probes, target.reshape(-1, 3)])
     owner = np.r_[owner, np.repeat(np.arange(len(target)), 3)]
-    _, near = cKDTree(probes).query(points, k=min(8, len(probes)))
+    _, near = cKDTree(probes).query(points, k=12)
     squared = point_triangle_squared(points[:, None, :], target[owner[near]])
     return float(np.sqrt(squared.min(axis=1).max()))
 
@@ -232,7 +234,7 @@ def _write(path: Path, parts: ConvexParts) -> None:
 
 def _read(path: Path) -> ConvexParts | None:
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as data:
             pieces = tuple((data[f"v{i}"], data[f"f{i}"]) for i in range(int(data["count"])))
             return ConvexParts(pieces, float(data["error"]))
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):

@@ -99,7 +99,8 @@ def _wound(mesh: Mended) -> Mended:
 def _capped(mesh: Mended) -> Mended:
     """Close every hole by a flat cap if its rim allows one, else by a fan around the rim's centre."""
     loops = [loop for loop in topology.boundary_loops(mesh.faces) if len(loop) >= 3]
-    if not loops:
+    two_sided = bool(topology.adjacency(mesh.faces)[2].all())  # a Möbius band has no side to cap
+    if not loops or not two_sided:
         return mesh
     vertices, caps, longest = mesh.vertices, [], 0.0
     for loop in loops:

@@ -51,10 +51,11 @@ def revolve(profile: ArrayLike, sides: int = SIDES) -> Mesh:
     return vertices, _tube_faces(len(points) - 2, sides, bottom, top)
 
 
-def sweep(curve: ArrayLike, section: ArrayLike, scale: ArrayLike = 1.0) -> Mesh:
+def sweep(curve: ArrayLike, section: ArrayLike, scale: ArrayLike, across: Array) -> Mesh:
     """A closed rod: the planar *section* ``(m, 2)``, counter-clockwise, carried along the *curve* ``(n, 3)``.
 
-    The section's frame is carried without twist (double reflection); *scale* ``(n,)`` or ``(n, 2)`` sizes it.
+    The section's frame starts with its first axis along *across* ``(3,)`` and is carried without twist (double
+    reflection, Wang et al. 2008); *scale* ``(n,)`` or ``(n, 2)`` sizes it.
     """
     points, flat = np.asarray(curve, dtype=np.float64), np.asarray(section, dtype=np.float64)
     n, m = len(points), len(flat)
@@ -62,7 +63,7 @@ def sweep(curve: ArrayLike, section: ArrayLike, scale: ArrayLike = 1.0) -> Mesh:
     sizes = np.broadcast_to(factors[:, None] if factors.ndim == 1 else factors, (n, 2))
     tangent = np.gradient(points, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1)[:, None]
-    u = np.cross(tangent[0], np.eye(3)[int(np.abs(tangent[0]).argmin())])
+    u = across - (across @ tangent[0]) * tangent[0]
     u /= np.linalg.norm(u)
     rings = []
     for i in range(n):
