@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from ..kinematics import Robot
 
 SAMPLES = 24  # random postures in which a pair of links must always touch to be taken as meant to
-MASSLESS = 1e-3  # kg and, with radius 1 cm, the inertia of a moving link that the description gives none
+MASSLESS = 1e-3  # kg, and the inertia of that at 1 cm, of a moving link that has no mass and carries none
+CARRIER = 1e-6  # kg of a moving link without mass that carries others, which have it
 MINIMUM = 1e-9  # what the engine takes as positive inertia
 
 
@@ -108,7 +109,7 @@ def _add_robot(spec: Any, robot: Robot, physics: Physics) -> list[str]:
     shapes.place(root, robot.base)
     _add_link(spec, root, description, description.root, assumptions)
     bodies = {description.root: root}
-    massive = _massive_groups(description)
+    massive, carriers = _massive_groups(description)
     for joint in description.joints:
         body = bodies[joint.parent].add_body(name=f"link:{joint.child}")
         shapes.place(body, joint.pose)
@@ -117,9 +118,13 @@ def _add_robot(spec: Any, robot: Robot, physics: Physics) -> list[str]:
         if joint.type is JointType.FIXED:
             continue
         _add_joint(body, joint, physics)
-        if joint.child not in massive:
-            body.explicitinertial = True
-            body.mass, body.inertia = MASSLESS, [MASSLESS * 0.01**2] * 3
+        if joint.child in massive:
+            continue
+        carries = joint.child in carriers
+        body.explicitinertial = True
+        body.mass = CARRIER if carries else MASSLESS
+        body.inertia = [body.mass * 0.01**2] * 3
+        if not carries:
             assumptions.append(f"link {joint.child} moves and has no mass; {MASSLESS * 1e3:g} g is assumed")
     for joint in description.joints:
         if joint.mimic is not None and joint.type is not JointType.FIXED:
@@ -168,13 +173,16 @@ def physical(inertia: Array) -> tuple[Array, str | None]:
     return (axes * fixed) @ axes.T, f"no body has the principal moments of inertia {found} kg m²; {used} are used"
 
 
-def _massive_groups(description: Description) -> set[str]:
-    """Links that have mass themselves or through what is fixed to them."""
+def _massive_groups(description: Description) -> tuple[set[str], set[str]]:
+    """Links that have mass themselves or through what is fixed to them; and those that have it beyond moving joints."""
     massive = {name for name, link in description.links.items() if link.inertial is not None and link.inertial.mass > 0}
+    carriers: set[str] = set()
     for joint in reversed(description.joints):
         if joint.type is JointType.FIXED and joint.child in massive:
             massive.add(joint.parent)
-    return massive
+        elif joint.child in massive | carriers:
+            carriers.add(joint.parent)
+    return massive, carriers
 
 
 def _add_joint(body: Any, joint: Joint, physics: Physics) -> None:
