@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: help pick test check bench view clean
+.PHONY: help pick test check bench view lock clean
 help:            ## list the targets
 	@grep -E '^[a-z]+: .*##|^[a-z]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 12
 
@@ -37,6 +37,13 @@ $(VENV)/.dev: $(VENV)/.core
 $(VENV)/.bench: $(VENV)/.dev
 	$(PIP) -c requirements/lock.txt -e '.[bench]'
 	touch $@
+
+lock:            ## write the versions of a fresh environment to requirements/lock.txt
+	rm -rf .lock-venv && $(PYTHON) -m venv .lock-venv
+	.lock-venv/bin/python -m pip install --quiet '.[dev,bench]'
+	(echo "# Versions that are known to work together, as constraints for pip; written by make lock."; \
+	 .lock-venv/bin/python -m pip freeze | grep -v '^apprehend') > requirements/lock.txt
+	rm -rf .lock-venv
 
 clean:           ## remove what the targets made
 	rm -rf $(VENV) pick-out .mypy_cache .ruff_cache .pytest_cache
