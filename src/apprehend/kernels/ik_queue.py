@@ -21,6 +21,7 @@ from .ik_chain import (
     TARGET,
     WORK,
     L,
+    add_columns,
     advance,
     box_error,
     columns,
@@ -104,7 +105,10 @@ def evaluate(chain, q, axes, w, tolerance, partial, free_axis):
 def newton(chain, q, axes, w, J, step, partial):
     """One step of all lanes."""
     k = chain.lower.shape[0]
-    columns(chain, axes, w, J)
+    if chain.kind.shape[0] == k:
+        columns(chain.kind, chain.gain, chain.column, axes, w, J)
+    else:
+        add_columns(chain, axes, w, J)
     if partial:
         turn_columns(w, chain.tool, J, k)
     hold_limits(chain, q, w, J)
