@@ -57,7 +57,10 @@ class Rig:
     hand: Hand
     hand_root: str | None
     q: Array
-    tcp: Array  # T_world_tcp
+
+    def tcp(self, width: float) -> Array:
+        """Pose of the tcp when the pads are *width* apart."""
+        return self.robot.fk(self.q, self.hand.root) @ self.hand.jaw.tcp_at(width)
 
 
 @lru_cache
@@ -69,7 +72,7 @@ def rig(name: str) -> Rig:
     hand = Hand.within(robot, root)
     q = robot.home.copy()
     q[hand.indices_in(robot)] = hand.jaw.q_at(hand.jaw.max_width)
-    return Rig(robot, hand, root, q, robot.fk(q, hand.root) @ hand.jaw.tcp_at(hand.jaw.max_width))
+    return Rig(robot, hand, root, q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +97,11 @@ class Held:
 
 
 def hold(name: str, body: Body, force: float, *, offset: Array | None = None, physics: Physics | None = None) -> Held:
-    """Close robot *name*'s hand with *force* around *body*, whose frame is at the tcp, moved by *offset* (4, 4)."""
+    """Close robot *name*'s hand with *force* around *body*, which is at the tcp of its width, moved by *offset* (4, 4)."""
     at = rig(name)
-    pose = at.tcp @ (np.eye(4) if offset is None else offset)
+    shift = np.eye(4) if offset is None else offset
+    width = float(np.ptp(body.vertices @ shift[0, :3]))
+    pose = at.tcp(width) @ shift
     world = World(scene(at.robot, hand_root=at.hand_root, object=(body, pose)), physics=physics)
     world.model.opt.gravity[2] = 0.0
     world.set_q(at.q)

@@ -27,7 +27,7 @@ class Physics:
 
     timestep: float = 0.002
     softness: float = 2.0
-    impedance: tuple[float, float] = (0.95, 0.99)
+    impedance: tuple[float, float] = (0.98, 0.995)
     width: float = 0.001
     impratio: float = 10.0
     iterations: int = 50
@@ -66,4 +66,4 @@ class Physics:
     @property
     def joint_solimp(self) -> list[float]:
         """MuJoCo's *solimp* of couplings between joints and of joint limits: as good as rigid."""
-        return [0.99, 0.9999, 0.001, 0.5, 2.0]
+        return [0.9999, 0.9999, 0.001, 0.5, 2.0]
