@@ -14,7 +14,8 @@ from ..errors import ApprehendError, DescriptionError, unknown_name
 from ..robots.combine import subtree
 from ..robots.description import Description, Joint, JointType
 from ..robots.meshes import link_surface
-from .jaw import ParallelJaw, find_jaw
+from .jaw import ParallelJaw
+from .jaw_search import find_jaw
 from .robot import Robot
 
 

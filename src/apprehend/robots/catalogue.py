@@ -12,11 +12,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import metadata
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from ..errors import DescriptionError, MissingDependencyError, unknown_name
-from .description import Description, Joint, Repair
+from .description import Description, Joint, JointType, Repair
 
 KINDS = ("arm", "hand", "arm-with-hand", "dual-arm", "mobile", "humanoid", "legged", "example")
 
@@ -33,6 +34,8 @@ class Entry:
     path: str
     extra: str = ""
     root: str = ""
+    without: str = ""
+    like: str = ""
     tool: str = ""
     incomplete: str = ""
     home: Mapping[str, float] = field(default_factory=dict)
@@ -70,7 +73,8 @@ def entries() -> Mapping[str, Entry]:
     """The catalogue: name → entry, in the order of the file."""
     text = (Path(__file__).parent / "catalogue.toml").read_text(encoding="utf-8")
     table = tomllib.loads(text)
-    return {name: Entry(name=name, **{**row, "limits": tuple(row.get("limits", ()))}) for name, row in table.items()}
+    rows = {name: {**table.get(str(row.get("like")), {}), **row} for name, row in table.items()}
+    return {name: Entry(name=name, **{**row, "limits": tuple(row.get("limits", ()))}) for name, row in rows.items()}
 
 
 def names(kind: str | None = None) -> tuple[str, ...]:
@@ -93,13 +97,19 @@ def applied(entry: Entry, description: Description) -> Description:
     joints = list(description.joints)
     for row in entry.limits:
         pattern = re.compile(str(row["joints"]))
-        hits = [i for i, j in enumerate(joints) if pattern.fullmatch(j.name)]
-        if not hits:
+        hits = [i for i, j in enumerate(joints) if j.type is not JointType.FIXED and pattern.fullmatch(j.name)]
+        if not hits and not entry.like:
             raise DescriptionError(f"catalogue entry {entry.name!r}: no joint matches {row['joints']!r}")
+        said = []
         for i in hits:
-            joints[i] = _limited(joints[i], row, entry.name, repairs)
-    unknown = entry.home.keys() - {j.name for j in joints}
-    if unknown:
+            joints[i], changed = _limited(joints[i], row)
+            said += changed
+        if said:
+            where, problem = f"catalogue entry {entry.name!r}", "the file lacks limits, or has placeholders"
+            repairs.append(Repair(where, problem, f"took {', '.join(said)} ({row['source']})"))
+    home = {n: v for n, v in entry.home.items() if n in {j.name for j in joints}}
+    unknown = entry.home.keys() - home.keys()
+    if unknown and not entry.like:
         raise DescriptionError(f"catalogue entry {entry.name!r}: home names unknown joints {sorted(unknown)}")
     if entry.tool and entry.tool not in description.links:
         raise DescriptionError(f"catalogue entry {entry.name!r}: the tool frame {entry.tool!r} does not exist")
@@ -107,18 +117,19 @@ def applied(entry: Entry, description: Description) -> Description:
         description,
         name=entry.name,
         joints=tuple(joints),
-        home={**description.home, **entry.home},
+        home={**description.home, **home},
         tool=entry.tool,
         repairs=tuple(repairs),
     )
 
 
-def _limited(joint: Joint, row: Mapping[str, Any], name: str, repairs: list[Repair]) -> Joint:
+def _limited(joint: Joint, row: Mapping[str, Any]) -> tuple[Joint, list[str]]:
+    """*joint* with the limits of a catalogue row, and what that changes, in words."""
     changes = {k: float(v) for k, v in row.items() if k in ("lower", "upper", "velocity", "acceleration", "effort")}
-    old = {k: getattr(joint.limits, k) for k in changes}
-    differing = {k: v for k, v in changes.items() if v != old[k]}
-    if differing:
-        said = ", ".join(f"{k} {v:g} instead of {old[k]:g}" for k, v in differing.items())
-        repairs.append(Repair(f"catalogue entry {name!r}", f"joint {joint.name!r}: the file's limits need replacing",
-                              f"took {said} ({row['source']})"))  # fmt: skip
-    return replace(joint, limits=replace(joint.limits, **changes))
+    said = []
+    for kind, value in changes.items():
+        old = getattr(joint.limits, kind)
+        if value != old:
+            instead = f" instead of {old:g}" if isfinite(old) else ""
+            said.append(f"{joint.name} {kind} {value:g}{instead}")
+    return replace(joint, limits=replace(joint.limits, **changes)), said

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from ..errors import DescriptionError, UnknownNameError
+from ..errors import DescriptionError
 from . import catalogue
-from .combine import subtree
+from .combine import subtree, without
 from .description import Description
 from .paths import Packages
 from .srdf import allowed_within, beside, read_srdf
@@ -34,6 +34,8 @@ def load_description(
         description = read_file(entry.file(), packages=packages, meshes=meshes, inertias=inertias)
         if entry.root:
             description = subtree(description, entry.root)
+        if entry.without:
+            description = without(description, entry.without)
         return catalogue.applied(entry, description)
     return read_file(path, packages=packages, meshes=meshes, inertias=inertias)
 
@@ -44,7 +46,9 @@ def read_file(path: Path, *, packages: Packages, meshes: str, inertias: str) -> 
         raise DescriptionError(f"{path} is a folder; expected a file of type {', '.join(SUFFIXES)}")
     suffix = path.suffix.lower()
     if suffix == ".xacro":
-        raise DescriptionError(f"{path} is a xacro file; expand it first: xacro {path.name} > {path.stem}.urdf")
+        raise DescriptionError(
+            f"{path} is a xacro file; expand it first: xacro {path.name} > {path.stem.removesuffix('.urdf')}.urdf"
+        )
     if suffix == ".urdf":
         description = read_urdf(path, packages=packages, meshes=meshes, inertias=inertias)
         srdf = beside(description)
@@ -53,5 +57,5 @@ def read_file(path: Path, *, packages: Packages, meshes: str, inertias: str) -> 
             description = replace(description, allowed_collisions=description.allowed_collisions | allowed)
         return description
     if not path.exists():
-        raise UnknownNameError(f"{path} is neither a file nor a name of the catalogue: {', '.join(catalogue.names())}")
+        raise DescriptionError(f"{path} does not exist; expected a file, or a name of the catalogue such as 'panda'")
     raise DescriptionError(f"{path}: files of type {suffix!r} are not read; expected one of {', '.join(SUFFIXES)}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -20,9 +21,10 @@ MAX_BYTES = 512 * 1024 * 1024
 def load_shape_mesh(shape: Shape) -> tuple[Array, IntArray]:
     """Vertices ``(V, 3)`` and faces ``(F, 3)`` of a mesh shape, scaled to metres; ``shape.pose`` is *not* applied.
 
-    Equal vertices are merged (STL repeats every corner); faces without area are kept. A COLLADA file's unit and up axis
-    are applied, as ROS tools do. All parts of a file are joined. A scale that mirrors turns the faces round, so that
-    they keep looking outwards. Raises `MeshError` for files that are missing, unreadable, or without faces.
+    Equal vertices are merged (STL repeats every corner); faces without area are kept. A COLLADA file's unit is applied
+    and its up axis is not, as in every tool that displays URDF: the files are drawn in the axes of the link. All parts
+    of a file are joined. A scale that mirrors turns the faces round, so that they keep looking outwards. Raises
+    `MeshError` for files that are missing, unreadable, or without faces.
     """
     if shape.kind is not ShapeKind.MESH or shape.mesh is None:
         raise MeshError(f"shape {shape.name!r} is a {shape.kind.value}, not a mesh")
@@ -44,8 +46,10 @@ def read_mesh(path: Path) -> tuple[Array, IntArray]:
     except OSError as error:
         raise MeshError(f"mesh {path} cannot be read: {error.strerror}") from error
     kind = path.suffix.lower().lstrip(".")
+    unit = 1.0
     if kind == "dae":
         _refuse_entities(data, path)
+        unit = _collada_unit(data)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -59,7 +63,7 @@ def read_mesh(path: Path) -> tuple[Array, IntArray]:
         raise MeshError(f"mesh {path} has no faces")
     if not np.isfinite(vertices).all():
         raise MeshError(f"mesh {path} has vertices that are not finite")
-    return _merged(vertices, faces)
+    return _merged(vertices * unit, faces)
 
 
 def _merged(vertices: Array, faces: IntArray) -> tuple[Array, IntArray]:
@@ -72,6 +76,16 @@ def _refuse_entities(data: bytes, path: Path) -> None:
     head = data.replace(b"\0", b"").upper()
     if b"<!DOCTYPE" in head or b"<!ENTITY" in head:
         raise MeshError(f"mesh {path} declares a DOCTYPE or entities, which is refused; remove the declaration")
+
+
+def _collada_unit(data: bytes) -> float:
+    """Metres per unit of a COLLADA file."""
+    found = re.search(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']*)[\"']", data)
+    try:
+        unit = float(found.group(1)) if found else 1.0
+    except ValueError:
+        return 1.0
+    return unit if unit > 0.0 else 1.0
 
 
 def shape_surface(shape: Shape, segments: int = 32) -> tuple[Array, IntArray]:
