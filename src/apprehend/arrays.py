@@ -28,6 +28,8 @@ def as_array(value: ArrayLike, name: str, *, finite: bool = True) -> Array:
         array = np.asarray(value, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} must be numbers in a rectangular array; {error}") from error
+    if not array.flags.writeable:
+        array = array.copy()  # kernels would be compiled a second time for read-only arrays
     if finite and not np.isfinite(array).all():
         bad = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{name}{list(bad) if bad else ''} is {array[bad]}; every entry must be finite")
