@@ -1,7 +1,19 @@
 """Scenes, and collision of robots with themselves and with what stands around them."""
 
 from .model import Closest, CollisionModel, Touch
+from .pairs import Separation, signed_distance
 from .scene import Box, Placed, RobotSource, Scene
 from .shapes import Convex
 
-__all__ = ["Box", "Closest", "CollisionModel", "Convex", "Placed", "RobotSource", "Scene", "Touch"]
+__all__ = [
+    "Box",
+    "Closest",
+    "CollisionModel",
+    "Convex",
+    "Placed",
+    "RobotSource",
+    "Scene",
+    "Separation",
+    "Touch",
+    "signed_distance",
+]

@@ -177,7 +177,9 @@ def load(path: Path) -> Scene:
     bodies = {p.body.name: p for p in placed}
     goals, pick, upright = _task(data, where, bodies)
     robot, hand_root = _at(f"{where}, [robot]", source.build)
-    return Scene(
+    scene: Scene = _at(
+        where,
+        Scene,
         robot=robot,
         robot_source=source,
         bodies=bodies,
@@ -190,6 +192,7 @@ def load(path: Path) -> Scene:
         hand_root=hand_root,
         source=path,
     )
+    return scene
 
 
 def _at(where: str, call: Any, *args: Any, **options: Any) -> Any:

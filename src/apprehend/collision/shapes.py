@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, as_pose, as_shaped, as_vector
 from ..errors import InputError
-from ..kernels.gjk import BOX, CYLINDER, HULL
+from ..kernels.gjk import BOX, CONE, CYLINDER, ELLIPSOID, HULL
 from ..robots import load_shape_mesh
 from ..robots.description import Link, Shape, ShapeKind
 
@@ -27,11 +27,11 @@ class Convex:
     """A convex core grown by a radius, at a pose in the frame of what carries it (a link, a body, or the world).
 
     A sphere is a grown point and a capsule a grown segment; hulls are given by their vertices. Make one with `box`,
-    `sphere`, `capsule`, `cylinder` or `hull`.
+    `sphere`, `capsule`, `cylinder`, `cone`, `ellipsoid` or `hull`.
     """
 
     kind: int
-    size: Array = field(default_factory=lambda: np.zeros(3))  # box: half extents; cylinder: radius, half length
+    size: Array = field(default_factory=lambda: np.zeros(3))  # half extents, radius and half length, or radii
     radius: float = 0.0
     points: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (V, 3) vertices of a hull in the shape's frame
     faces: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  # (F, 3) of a hull, outward
@@ -67,6 +67,19 @@ class Convex:
         return Convex(CYLINDER, np.array([radius, 0.5 * length, 0.0]))
 
     @staticmethod
+    def cone(radius: float, length: float) -> Convex:
+        """A cone along z with its tip at +length/2."""
+        _positive("radius and length of a cone", radius, length)
+        return Convex(CONE, np.array([radius, 0.5 * length, 0.0]))
+
+    @staticmethod
+    def ellipsoid(radii: ArrayLike) -> Convex:
+        """An ellipsoid of radii (3,) along its axes."""
+        size = as_vector(radii, "radii", 3)
+        _positive("the radii of an ellipsoid", *size)
+        return Convex(ELLIPSOID, size)
+
+    @staticmethod
     def hull(vertices: ArrayLike, radius: float = 0.0) -> Convex:
         """The convex hull of ``(V, 3)`` points, grown by *radius*; flat sets and single points are allowed."""
         points = as_shaped(vertices, "vertices", 3)
@@ -88,9 +101,9 @@ class Convex:
     @functools.cached_property
     def half(self) -> Array:
         """Half extents (3,) of the box about the shape's origin, in the shape's frame, that holds it."""
-        if self.kind == BOX:
+        if self.kind in (BOX, ELLIPSOID):
             half = self.size
-        elif self.kind == CYLINDER:
+        elif self.kind in (CYLINDER, CONE):
             half = np.array([self.size[0], self.size[0], self.size[1]])
         else:
             half = np.abs(self.points).max(axis=0)
@@ -100,8 +113,10 @@ class Convex:
     def ball(self) -> tuple[Array, float]:
         """Centre (3,) and radius of a sphere that holds the shape, in the carrier's frame."""
         core = np.linalg.norm(self.points, axis=1).max() if self.kind == HULL else np.linalg.norm(self.half)
-        if self.kind == CYLINDER:
-            core = float(np.hypot(self.size[0], self.size[1]))
+        if self.kind in (CYLINDER, CONE):
+            core = np.hypot(self.size[0], self.size[1])
+        elif self.kind == ELLIPSOID:
+            core = self.size.max()
         return self.pose[:3, 3], float(core) * (1.0 + ROUND_OFF) + self.radius
 
     @functools.cached_property

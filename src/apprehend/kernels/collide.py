@@ -16,7 +16,7 @@ import numpy as np
 
 from ._jit import kernel
 from .gjk import compose, gjk, relative
-from .gjk_depth import DepthSpace, PairSpace, signed_distance
+from .gjk_depth import PairSpace, new_pair_space, signed_distance
 from .tree import TreeModel, tree_single
 
 WORLD = -1
@@ -62,19 +62,7 @@ class CollideSpace(NamedTuple):
 def make_space(model, n):
     """Fresh scratch for *model* with *n* coordinates."""
     G, K, P = model.ints.shape[0], model.carrier.shape[0], model.pairs.shape[0]
-    depth = DepthSpace(
-        np.zeros((260, 9)), np.zeros((1024, 3), np.int64), np.zeros((1024, 4)), np.zeros((1024, 2), np.int64)
-    )
-    pair = PairSpace(
-        np.zeros((5, 9)),
-        np.zeros(4),
-        np.zeros(3),
-        np.zeros(2, np.int64),
-        np.zeros(12),
-        np.zeros((2, 12)),
-        np.zeros((2, 3)),
-        depth,
-    )
+    pair = new_pair_space()
     return CollideSpace(
         np.zeros((model.tree.kind.shape[0], 12)),
         np.zeros((G, 12)),

@@ -1,11 +1,14 @@
 """Distance between two convex shapes: the algorithm of Gilbert, Johnson and Keerthi, one pair at a time.
 
+Compiled without reordering of operations: the last bits decide whether a thin simplex still makes progress.
+
 A shape is a convex core, grown by a radius: a sphere is a grown point, a capsule a grown segment. The shapes of a
 model are rows of
 
 =========== ===========  ========================================================================================
 ``ints``    (G, 4)       kind, first vertex, number of vertices, free for the caller
-``floats``  (G, 20)      0:3 half extents (box) or radius and half length (cylinder); 3 growing radius; 4:7 and 7
+``floats``  (G, 20)      0:3 half extents (box), radius and half length (cylinder, cone: tip at
+                         +half length), or radii (ellipsoid); 3 growing radius; 4:7 and 7
                          centre and radius of a bounding sphere, in the frame of the carrier; 8:20 pose of the shape
                          in the frame of its carrier (rotation row-major, translation)
 ``points``  (V, 3)       vertices of all hulls, in the frames of their shapes
@@ -14,7 +17,7 @@ model are rows of
 =========== ===========  ========================================================================================
 
 Everything happens in the frame of the first shape; ``rel`` (12,) is the pose of the second shape in it. The
-simplex lives in ``ws`` (4, 9): a row holds w = a − b, a and b.
+simplex lives in the first rows of ``ws`` (9, 9) with weights ``bary`` (8,): a row holds w = a − b, a and b.
 """
 
 from __future__ import annotations
@@ -26,6 +29,8 @@ from ._jit import kernel
 HULL = 0
 BOX = 1
 CYLINDER = 2
+CONE = 3
+ELLIPSOID = 4
 
 CLIMB_FROM = 24
 """Hulls with more vertices than this are climbed from neighbour to neighbour instead of searched."""
@@ -34,7 +39,7 @@ MAX_STEPS = 200
 TINY = 1e-14
 
 
-@kernel
+@kernel(fast=False)
 def support(ints, floats, points, first, around, g, dx, dy, dz, hint):
     """The point of the core of shape *g* that is farthest along (dx, dy, dz), and its vertex for the next hint."""
     kind = ints[g, 0]
@@ -47,6 +52,20 @@ def support(ints, floats, points, first, around, g, dx, dy, dz, hint):
             return floats[g, 0], 0.0, z, 0
         s = floats[g, 0] / across
         return s * dx, s * dy, z, 0
+    if kind == ELLIPSOID:
+        ax, ay, az = floats[g, 0] * dx, floats[g, 1] * dy, floats[g, 2] * dz
+        norm = math.sqrt(ax * ax + ay * ay + az * az)
+        if norm < 1e-300:
+            return floats[g, 0], 0.0, 0.0, 0
+        return floats[g, 0] * ax / norm, floats[g, 1] * ay / norm, floats[g, 2] * az / norm, 0
+    if kind == CONE:
+        across = math.sqrt(dx * dx + dy * dy)
+        if 2.0 * floats[g, 1] * dz >= floats[g, 0] * across:
+            return 0.0, 0.0, floats[g, 1], 0
+        if across < 1e-300:
+            return floats[g, 0], 0.0, -floats[g, 1], 0
+        s = floats[g, 0] / across
+        return s * dx, s * dy, -floats[g, 1], 0
     start, count = ints[g, 1], ints[g, 2]
     if count <= CLIMB_FROM:
         best = 0
@@ -75,7 +94,7 @@ def support(ints, floats, points, first, around, g, dx, dy, dz, hint):
     return points[k, 0], points[k, 1], points[k, 2], best
 
 
-@kernel
+@kernel(fast=False)
 def relative(A, B, out):
     """``out = inv(A) B`` for poses (12,)."""
     for i in range(3):
@@ -85,7 +104,7 @@ def relative(A, B, out):
         out[9 + i] = a0 * (B[9] - A[9]) + a1 * (B[10] - A[10]) + a2 * (B[11] - A[11])
 
 
-@kernel
+@kernel(fast=False)
 def compose(A, B, out):
     """``out = A B`` for poses (12,)."""
     for i in range(3):
@@ -95,7 +114,7 @@ def compose(A, B, out):
         out[9 + i] = A[9 + i] + a0 * B[9] + a1 * B[10] + a2 * B[11]
 
 
-@kernel
+@kernel(fast=False)
 def difference(ints, floats, points, first, around, a, b, rel, dx, dy, dz, row, hints):
     """Support of A − B along d, into ``row`` (w, a, b): a farthest along d, b farthest along −d."""
     ax, ay, az, hints[0] = support(ints, floats, points, first, around, a, dx, dy, dz, hints[0])
@@ -111,7 +130,7 @@ def difference(ints, floats, points, first, around, a, b, rel, dx, dy, dz, row, 
     row[6], row[7], row[8] = bx, by, bz
 
 
-@kernel
+@kernel(fast=False)
 def nearest_on_segment(P, i, j, bary):
     """Barycentric coordinates of the point nearest to the origin on segment i-j of ``P``; its squared norm."""
     ax, ay, az = P[i, 0], P[i, 1], P[i, 2]
@@ -127,7 +146,7 @@ def nearest_on_segment(P, i, j, bary):
     return x * x + y * y + z * z
 
 
-@kernel
+@kernel(fast=False)
 def nearest_on_triangle(P, i, j, k, bary):
     """As `nearest_on_segment` for the triangle i-j-k; slivers are answered by their edges."""
     ax, ay, az = P[i, 0], P[i, 1], P[i, 2]
@@ -137,6 +156,8 @@ def nearest_on_triangle(P, i, j, k, bary):
     nn = nx * nx + ny * ny + nz * nz
     uu = ux * ux + uy * uy + uz * uz
     vv = vx * vx + vy * vy + vz * vz
+    ci, cj, ck = 0.0, 0.0, 0.0
+    inner = 1e300
     if nn > 1e-26 * uu * vv:
         # coordinates of the projected origin: areas of the triangles that it makes with the edges
         qx, qy, qz = -ax, -ay, -az
@@ -144,9 +165,11 @@ def nearest_on_triangle(P, i, j, k, bary):
         ck = ((uy * qz - uz * qy) * nx + (uz * qx - ux * qz) * ny + (ux * qy - uy * qx) * nz) / nn
         ci = 1.0 - cj - ck
         if ci >= 0.0 and cj >= 0.0 and ck >= 0.0:
-            bary[i], bary[j], bary[k] = ci, cj, ck
-            h = (ax * nx + ay * ny + az * nz) / nn
-            return h * h * nn
+            x, y, z = ax + cj * ux + ck * vx, ay + cj * uy + ck * vy, az + cj * uz + ck * vz
+            inner = x * x + y * y + z * z
+            if nn > 1e-12 * uu * vv:
+                bary[i], bary[j], bary[k] = ci, cj, ck
+                return inner
     best = nearest_on_segment(P, i, j, bary)
     bi, bj, bk = bary[i], bary[j], 0.0
     d = nearest_on_segment(P, j, k, bary)
@@ -157,11 +180,14 @@ def nearest_on_triangle(P, i, j, k, bary):
     if d < best:
         best = d
         bi, bj, bk = bary[i], 0.0, bary[k]
+    if inner < best:  # a sliver: its coordinates are uncertain, so that the edges compete
+        best = inner
+        bi, bj, bk = ci, cj, ck
     bary[i], bary[j], bary[k] = bi, bj, bk
     return best
 
 
-@kernel
+@kernel(fast=False)
 def side(P, i, j, k, o):
     """Signed volume with which the origin lies on the other side of face i-j-k than vertex o, relative; > 0: outside."""
     ax, ay, az = P[i, 0], P[i, 1], P[i, 2]
@@ -176,7 +202,7 @@ def side(P, i, j, k, o):
     return -to_0 if to_o > 0.0 else to_0
 
 
-@kernel
+@kernel(fast=False)
 def reduce_simplex(ws, n, bary):
     """Nearest point to the origin on the simplex of rows ``0 … n − 1``: keep only the rows that carry it.
 
@@ -220,7 +246,7 @@ def reduce_simplex(ws, n, bary):
     return kept, best
 
 
-@kernel
+@kernel(fast=False)
 def gjk(ints, floats, points, first, around, a, b, rel, ws, bary, axis, hints, above, below, relative_gap):
     """Distance of the cores of shapes *a* and *b*, *rel* the pose of b in a.
 
@@ -262,7 +288,11 @@ def gjk(ints, floats, points, first, around, a, b, rel, ws, bary, axis, hints, a
             lower = upper if upper - lower <= 1e-9 * upper + 1e-13 * math.sqrt(size) else lower
             break
         size = max(size, wx * wx + wy * wy + wz * wz)
-        rows, new = reduce_simplex(ws, n + 1, bary)
+        for i in range(n):
+            bary[4 + i] = bary[i]
+            for c in range(9):
+                ws[5 + i, c] = ws[i, c]
+        rows, _ = reduce_simplex(ws, n + 1, bary)
         if rows == 4:
             axis[0], axis[1], axis[2] = vx, vy, vz
             return 4, 0.0, 0.0
@@ -271,12 +301,15 @@ def gjk(ints, floats, points, first, around, a, b, rel, ws, bary, axis, hints, a
             x += bary[i] * ws[i, 0]
             y += bary[i] * ws[i, 1]
             z += bary[i] * ws[i, 2]
-        n = rows
         new = x * x + y * y + z * z
-        stalled = new >= vv
-        vx, vy, vz, vv = x, y, z, new
-        if stalled:
+        if new >= vv:  # rounding: the step before was the best
+            for i in range(n):
+                bary[i] = bary[4 + i]
+                for c in range(9):
+                    ws[i, c] = ws[5 + i, c]
             break
+        n = rows
+        vx, vy, vz, vv = x, y, z, new
     upper = math.sqrt(vv)
     if vv <= TINY * TINY * size:
         return n, 0.0, 0.0
@@ -284,7 +317,7 @@ def gjk(ints, floats, points, first, around, a, b, rel, ws, bary, axis, hints, a
     return n, min(lower, upper), upper
 
 
-@kernel
+@kernel(fast=False)
 def witnesses(ws, bary, rows, pa, pb):
     """The nearest points of the cores, in the frame of the first shape."""
     for c in range(3):

@@ -32,8 +32,8 @@ class DepthSpace(NamedTuple):
 class PairSpace(NamedTuple):
     """Scratch of one thread for whole queries of one pair at a time."""
 
-    simplex: np.ndarray  # (5, 9)
-    bary: np.ndarray  # (4,)
+    simplex: np.ndarray  # (9, 9)
+    bary: np.ndarray  # (8,)
     axis: np.ndarray  # (3,)
     hints: np.ndarray  # (2,) int64
     rel: np.ndarray  # (12,)
@@ -42,17 +42,18 @@ class PairSpace(NamedTuple):
     depth: DepthSpace
 
 
-def pair_space() -> PairSpace:
+@kernel(fast=False)
+def new_pair_space():
     """Fresh scratch."""
     depth = DepthSpace(
-        np.zeros((MAX_POINTS, 9)),
-        np.zeros((MAX_FACES, 3), np.int64),
-        np.zeros((MAX_FACES, 4)),
-        np.zeros((MAX_FACES, 2), np.int64),
+        np.empty((MAX_POINTS, 9)),
+        np.empty((MAX_FACES, 3), np.int64),
+        np.empty((MAX_FACES, 4)),
+        np.empty((MAX_FACES, 2), np.int64),
     )
     return PairSpace(
-        np.zeros((5, 9)),
-        np.zeros(4),
+        np.zeros((9, 9)),
+        np.zeros(8),
         np.zeros(3),
         np.zeros(2, np.int64),
         np.zeros(12),
@@ -62,7 +63,7 @@ def pair_space() -> PairSpace:
     )
 
 
-@kernel
+@kernel(fast=False)
 def put_face(P, F, N, f, i, j, k, inner):
     """Face *f* of the polytope, wound so that its normal points away from *inner*; False for a sliver."""
     ux, uy, uz = P[j, 0] - P[i, 0], P[j, 1] - P[i, 1], P[j, 2] - P[i, 2]
@@ -82,7 +83,7 @@ def put_face(P, F, N, f, i, j, k, inner):
     return True
 
 
-@kernel
+@kernel(fast=False)
 def away_from_line(P, axis, out):
     """Two unit vectors across the line through points 0 and 1, into ``out`` (6,)."""
     ex, ey, ez = P[1, 0] - P[0, 0], P[1, 1] - P[0, 1], P[1, 2] - P[0, 2]
@@ -100,7 +101,7 @@ def away_from_line(P, axis, out):
     out[3], out[4], out[5] = ey * z - ez * y, ez * x - ex * z, ex * y - ey * x
 
 
-@kernel
+@kernel(fast=False)
 def tetrahedron(ints, floats, points, first, around, a, b, rel, P, n, hints, normal, across):
     """Extend the *n* rows of ``P``, which span a simplex that holds the origin, to a tetrahedron.
 
@@ -161,7 +162,7 @@ def tetrahedron(ints, floats, points, first, around, a, b, rel, P, n, hints, nor
     return 4
 
 
-@kernel
+@kernel(fast=False)
 def depth(ints, floats, points, first, around, a, b, rel, ws, n, hints, space, axis, pa, pb):
     """Penetration depth of the cores, given the simplex of *n* rows of ``ws`` around the origin.
 
@@ -174,11 +175,7 @@ def depth(ints, floats, points, first, around, a, b, rel, ws, n, hints, space, a
             P[i, c] = ws[i, c]
     dim = tetrahedron(ints, floats, points, first, around, a, b, rel, P, n, hints, axis, ws[4])
     if dim < 4:
-        bary = ws[4]
-        for c in range(3):  # flat: the origin itself is the deepest point
-            pa[c], pb[c] = P[0, 3 + c] - P[0, c], P[0, 6 + c]
-        bary[0] = 1.0
-        return 0.0, 0.0
+        return 0.0, 0.0  # flat: the nearest points stay what they are
     inner = ws[4]
     for c in range(3):
         inner[c] = 0.25 * (P[0, c] + P[1, c] + P[2, c] + P[3, c])
@@ -252,7 +249,7 @@ def depth(ints, floats, points, first, around, a, b, rel, ws, n, hints, space, a
     return min(low, best), best if answer == 1 else low
 
 
-@kernel
+@kernel(fast=False)
 def deepest(P, i, j, k, axis, height, pa, pb):
     """Points of a and b whose difference is nearest to ``−height · axis`` on triangle i-j-k."""
     ox, oy, oz = -axis[0] * height, -axis[1] * height, -axis[2] * height
@@ -274,7 +271,7 @@ def deepest(P, i, j, k, axis, height, pa, pb):
         pb[c] = (1.0 - s - t) * P[i, 6 + c] + s * P[j, 6 + c] + t * P[k, 6 + c]
 
 
-@kernel
+@kernel(fast=False)
 def signed_distance(ints, floats, points, first, around, a, b, rel, space):
     """Signed distance of shapes *a* and *b* (negative: depth), *rel* the pose of b in a.
 
@@ -286,8 +283,9 @@ def signed_distance(ints, floats, points, first, around, a, b, rel, space):
         ints, floats, points, first, around, a, b, rel, space.simplex, space.bary, axis, space.hints, 1e300, 0.0, 1e-13
     )
     ra, rb = floats[a, 3], floats[b, 3]
-    if upper > 0.0:
+    if rows < 4:
         witnesses(space.simplex, space.bary, rows, pa, pb)
+    if upper > 0.0:
         distance = upper
         for c in range(3):
             axis[c] /= upper
