@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Array
 from ..conventions import GRAVITY
 from ..kernels import dynamics as kernels
+from ..kernels import mass as inertia_kernels
 from ..kernels.tree import TreeModel, centers_of_mass
 from ..parallel import over_ranges
 
@@ -46,7 +47,7 @@ def inverse_dynamics(model: TreeModel, q: Array, qd: Array, qdd: Array, out: Arr
 
 def mass_matrix(model: TreeModel, q: Array, out: Array) -> int:
     """Mass matrices by the composite rigid body algorithm; the first row that is not finite, or −1."""
-    return each_range(lambda a, b: int(kernels.mass_matrix(model, q, a, b, out)), q.shape[0])
+    return each_range(lambda a, b: int(inertia_kernels.mass_matrix(model, q, a, b, out)), q.shape[0])
 
 
 def center_of_mass(model: TreeModel, q: Array, out: Array) -> int:
@@ -59,7 +60,7 @@ def forward_dynamics(model: TreeModel, q: Array, qd: Array, tau: Array, out: Arr
     singular: list[tuple[int, int]] = []
 
     def run(a: int, b: int) -> int:
-        bad, row, coordinate = kernels.forward_dynamics(model, q, qd, tau, DOWN, a, b, out)
+        bad, row, coordinate = inertia_kernels.forward_dynamics(model, q, qd, tau, DOWN, a, b, out)
         if row >= 0:
             singular.append((int(row), int(coordinate)))
         return int(bad)

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, as_pose, as_shaped, choice
 from ..errors import InputError, unknown_name
 from ..kernels import chain as chain_kernels
+from ..kernels import single as single_kernels
 from ..kernels import tree as tree_kernels
 from ..kernels.chain import ChainModel
 from ..kernels.tree import TreeModel
@@ -187,7 +188,7 @@ class Robot:
                     self._refuse(q)
                 return out
             out = np.empty((4, 4))
-            if chain_kernels.chain_single(self._chains.get(frame) or self.chain_model(frame), q, 0, out, _NO_JACOBIAN):
+            if single_kernels.chain_single(self._chains.get(frame) or self.chain_model(frame), q, 0, out, _NO_JACOBIAN):
                 self._refuse(q)
             return out
         count = math.prod(q.shape[:-1])
@@ -227,7 +228,7 @@ class Robot:
         if q.ndim == 1:
             T = np.empty((4, 4))
             J = np.empty((6, self.n))
-            if chain_kernels.chain_single(chain, q, kind, T, J):
+            if single_kernels.chain_single(chain, q, kind, T, J):
                 self._refuse(q)
             return J, T
         count = math.prod(q.shape[:-1])
