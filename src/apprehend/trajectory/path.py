@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, as_array
 from ..errors import InputError
-from .piecewise import Piecewise
+from .piecewise import Piecewise, hermite
 
 
 @runtime_checkable
@@ -28,7 +29,7 @@ class Path(Protocol):
     def interval(self) -> tuple[float, float]:
         """First and last value of s."""
 
-    def __call__(self, s: ArrayLike, order: int = 0) -> Array:
+    def __call__(self, s: ArrayLike, order: int = 0, /) -> Array:
         """The derivative *order* at *s*."""
 
 
@@ -36,6 +37,48 @@ class PolynomialPath(Piecewise):
     """A path made of polynomials: its ranges are proven, and its timing can be certified between grid points."""
 
     _variable = "s"
+
+    @cached_property
+    def smooth(self) -> bool:
+        """Whether the path is C² (its curvature does not jump)."""
+        return all(
+            self.degree < order
+            or self.breaks.size < 3
+            or float(np.abs(self.jumps(order)).max()) <= 1e-9 * (1.0 + float(self.extrema(order).magnitude.max()))
+            for order in range(3)
+        )
+
+
+def as_polynomial(path: Path, tolerance: float = 1e-8, pieces: int = 2**14) -> PolynomialPath:
+    """*path* itself if it is made of polynomials, else quintic Hermite pieces that follow it.
+
+    The pieces meet value and first two derivatives at their ends (the result is C² where the path is); intervals are
+    halved until the middle and the quarters are met within *tolerance*. Raises `InputError` where *pieces* do not do.
+    """
+    if isinstance(path, PolynomialPath):
+        return path
+    if not isinstance(path, Path):
+        raise InputError(
+            f"path is {type(path).__name__}; expected a Path: path(s, order), path.interval, path.n (waypoints: "
+            "Spline(waypoints) or polyline(waypoints))"
+        )
+    start, end = path.interval
+    grid = np.linspace(start, end, 9)
+    while True:
+        states = np.stack([np.asarray(path(grid, order), dtype=np.float64) for order in range(3)])
+        made = PolynomialPath(grid, hermite(grid, states))
+        inner = (grid[:-1, None] + np.diff(grid)[:, None] * np.array([0.25, 0.5, 0.75])).ravel()
+        error = np.abs(made(inner) - path(inner)).max(axis=1).reshape(-1, 3).max(axis=1)
+        rough = error > tolerance
+        if not rough.any():
+            return made
+        if grid.size > pieces or np.diff(grid)[rough].min() < 1e-9 * (end - start):
+            k = int(error.argmax())
+            raise InputError(
+                f"the path is not smooth near s = {grid[k]:.6g}: {grid.size - 1} quintic pieces miss it by "
+                f"{error[k]:.3g}"
+            )
+        grid = np.sort(np.concatenate([grid, 0.5 * (grid[:-1] + grid[1:])[rough]]))
 
 
 def polyline(points: ArrayLike) -> PolynomialPath:

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, BoolArray, as_array
+from ..arrays import Array, as_array
 from ..errors import InputError
 from ..kernels import path as path_kernels
 from ..kernels import timing as kernels
+from ..kernels.lanes import LANES
 from ..result import Result, Status
-from .limits import Limits
+from .constraints import Constraint, PowerLimits
+from .limits import LimitReport, Limits
 from .motion import Trajectory
-from .path import PolynomialPath
+from .path import Path, PolynomialPath, as_polynomial
+from .sampled import Sampled, sample
 
 MARGIN = 1e-11
 """Relative margin inside every limit that absorbs the rounding of the arithmetic."""
+POWER_ROUNDS = 24
+"""Timings tried for power limits, each starting from the speeds of the one before."""
 
 
 class TimingStatus(Status):
@@ -31,22 +38,25 @@ class TimingStatus(Status):
     STALLED = "The limits force the motion to a standstill in the middle of the path."
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Timing(Result):
     """Answer of `time_optimal`: the motion, its speed profile over the grid, and where it fails if it does.
 
-    ``motion`` is a `Trajectory` (``require_success`` first); ``grid (N + 1,)`` and ``speed (N + 1,)`` hold s and ṡ;
-    ``t (N + 1,)`` the times. ``s`` and ``reason`` name the place and the constraint of a failure.
+    ``grid (N + 1,)``, ``speed (N + 1,)`` and ``t (N + 1,)`` hold s, ṡ and the time at the grid points. ``s`` and
+    ``reason`` name the place and the constraint of a failure; ``margin`` is the largest share of a sampled limit
+    (torque, Cartesian) that was held back for what its functions do between the samples.
     """
 
     status: TimingStatus
     path: PolynomialPath
+    limits: Limits
     grid: Array
     speed: Array
     t: Array
     timing: Array
-    s: float = float("nan")
+    s: float | None = None
     reason: str = ""
+    margin: float = 0.0
 
     def explain(self) -> str:
         """The outcome, with the place and the constraint of a failure."""
@@ -58,11 +68,16 @@ class Timing(Result):
         self.require_success()
         return float(self.t[-1])
 
-    @property
+    @cached_property
     def motion(self) -> Trajectory:
         """The motion in time; raises `UnsuccessfulError` with the reason where there is none."""
         self.require_success()
         return composed(self.path, self.t, self.timing)
+
+    @cached_property
+    def report(self) -> LimitReport:
+        """The proof that velocity and acceleration keep their limits at all times, with the largest excess."""
+        return self.motion.check(self.limits)
 
 
 def composed(path: PolynomialPath, t: Array, timing: Array) -> Trajectory:
@@ -73,29 +88,189 @@ def composed(path: PolynomialPath, t: Array, timing: Array) -> Trajectory:
 
 
 def time_optimal(
-    path: PolynomialPath,
+    path: Path,
     limits: Limits | Any,
     *,
+    constraints: Sequence[Constraint] = (),
     grid: int | ArrayLike = 200,
     start_speed: float = 0.0,
     end_speed: float = 0.0,
     least: int = 1,
 ) -> Timing:
-    """The fastest motion along *path* within velocity and acceleration *limits*.
+    """The fastest motion along *path* within velocity and acceleration *limits* and further *constraints*.
 
     The grid holds every break of the path, so that between grid points the path is one polynomial and the path
     acceleration is constant. The limits are imposed on the Bernstein coefficients of velocity² and acceleration, whose
-    hull contains the functions: the motion keeps the limits at all times, not only at the grid points.
+    hull contains the functions: the motion keeps the limits at all times, not only at the grid points. *constraints*
+    (`TorqueLimits`, `PowerLimits`, `CartesianSpeed`, `CartesianAcceleration`) are interpolated between samples, with a
+    margin for the remainder.
 
     *grid* is the number of intervals (at least *least* per piece of the path) or the grid itself; ``start_speed`` and
-    ``end_speed`` are ṡ
-    at the ends. At a kink of the path (a jump of the tangent) the motion comes to rest.
+    ``end_speed`` are ṡ at the ends. At a kink of the path (a jump of the tangent) the motion comes to rest. A path
+    that is not made of polynomials is replaced by one (`as_polynomial`).
     """
+    curve = as_polynomial(path)
     limits = Limits.read(limits)
-    vlim, alim = limits.pairs("velocity", path.n), limits.pairs("acceleration", path.n)
+    vlim, alim = limits.pairs("velocity", curve.n), limits.pairs("acceleration", curve.n)
     for name, speed in (("start_speed", start_speed), ("end_speed", end_speed)):
         if not (np.isfinite(speed) and speed >= 0.0):
             raise InputError(f"{name} is {speed}; expected ṡ ≥ 0 along the path")
+    if not constraints and not np.isfinite(alim).all():
+        _refuse_unbounded(curve, alim)
+    problem = _Problem(curve, limits, make_grid(curve, grid, least), vlim * (1.0 - MARGIN), alim * (1.0 - MARGIN),
+                       float(start_speed), float(end_speed))  # fmt: skip
+    if not constraints:
+        return problem.solve(None)
+    power = [c for c in constraints if isinstance(c, PowerLimits)]
+    found = sample(curve, problem.grid, constraints)
+    timing = _with_margins(problem, found, power_of=None)
+    if power and timing.success:
+        timing = _within_power(problem, found, timing)
+    return timing
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    path: PolynomialPath
+    limits: Limits
+    grid: Array
+    vlim: Array
+    alim: Array
+    start_speed: float
+    end_speed: float
+
+    def solve(self, sampled: Sampled | None) -> Timing:
+        count = self.grid.size - 1
+        x, alpha, beta, t = np.zeros((4, count + 1))
+        timing = np.zeros((count, 3))
+        values, bounds = (_NO_SAMPLES, _NO_BOUNDS) if sampled is None else (sampled.values, sampled.bounds)
+        status, stage = kernels.solve(
+            self.path.breaks, self.path.coefficients, self.grid, self.vlim, self.alim, values, bounds,
+            binomials(2 * self.path.degree), self.start_speed**2, self.end_speed**2, alpha, beta, x, t, timing,
+        )  # fmt: skip
+        if status == kernels.OK:
+            return Timing(TimingStatus.SUCCESS, self.path, self.limits, self.grid, np.sqrt(x), t, timing)
+        return self._failure(status, stage, alpha, beta, np.sqrt(x), t, timing, sampled)
+
+    def _failure(
+        self, status: int, stage: int, alpha: Array, beta: Array, speed: Array, t: Array, timing: Array,
+        sampled: Sampled | None,
+    ) -> Timing:  # fmt: skip
+        kind = {
+            kernels.START: TimingStatus.START_SPEED,
+            kernels.END: TimingStatus.END_SPEED,
+            kernels.STALLED: TimingStatus.STALLED,
+        }.get(status, TimingStatus.INFEASIBLE)
+        if status == kernels.START:
+            reason = (
+                f"start_speed is {self.start_speed:.6g}; expected at least {np.sqrt(max(alpha[0], 0.0)):.6g} and at "
+                f"most {np.sqrt(max(beta[0], 0.0)):.6g}"
+            )
+        else:
+            reason = conflict(self.path, self.grid, stage, self.vlim, self.alim, sampled, float(beta[stage + 1]))
+            if status == kernels.END:
+                reason = f"end_speed is {self.end_speed:.6g}, against {reason}"
+        return Timing(
+            kind, self.path, self.limits, self.grid, speed, t, timing, float(self.grid[stage]), reason
+        )  # fmt: skip
+
+
+def _with_margins(problem: _Problem, found: Sampled, power_of: Array | None) -> Timing:
+    """Solve, bound what the sampled functions do between their samples at the speeds found, and tighten by that."""
+    margins = np.zeros(found.bounds.shape[:2])
+    timing = problem.solve(None)
+    for _ in range(6):
+        tightened = found.tightened(margins, power_of)
+        timing = problem.solve(tightened)
+        if not timing.success:
+            return timing
+        needed = found.remainder(timing.speed**2, problem.grid)
+        if (needed <= margins + 1e-13).all():
+            break
+        margins = np.maximum(margins, 1.25 * needed)
+    return Timing(
+        timing.status, timing.path, timing.limits, timing.grid, timing.speed, timing.t, timing.timing,
+        margin=found.share(margins),
+    )  # fmt: skip
+
+
+def _within_power(problem: _Problem, found: Sampled, timing: Timing) -> Timing:
+    """Timings within the power limits: the speed of one bounds the next, which may use the power that this frees."""
+    x = timing.speed**2
+    # a share of the power for gravity alone bounds the speed to begin with
+    still = np.abs(found.values[:, :, found.power, 2]).max(axis=1)
+    with np.errstate(divide="ignore"):
+        rest = (0.7 * found.bounds[:, found.power, 1] / still).min(axis=1)
+    bound = np.minimum(np.maximum(x[1:], x[:-1]), rest**2)
+    best: Timing | None = None
+    kept = bound
+    for _ in range(POWER_ROUNDS):
+        timing = _with_margins(problem, found, power_of=bound)
+        if not timing.success:
+            bound = 0.25 * bound if best is None else np.sqrt(bound * kept)
+            continue
+        if best is None or timing.t[-1] < best.t[-1]:
+            best, kept = timing, bound
+        x = timing.speed**2
+        top = np.maximum(np.maximum(x[1:], x[:-1]), 1e-9 * bound)
+        bound = np.sqrt(bound * top) * np.clip(1.0 / found.power_share(x, problem.grid), 1.0, 1.6)
+    return timing if best is None else best
+
+
+def conflict(
+    path: PolynomialPath, grid: Array, stage: int, vlim: Array, alim: Array, sampled: Sampled | None, y_high: float
+) -> str:
+    """Which rows of interval *stage* exclude every speed, in words."""
+    values, bounds = (_NO_SAMPLES, _NO_BOUNDS) if sampled is None else (
+        sampled.values[stage : stage + 1], sampled.bounds[stage : stage + 1]
+    )  # fmt: skip
+    rows = int(kernels.row_count(path.degree, path.n, values.shape[2]))
+    slope, low, high = np.empty((3, 1, rows, LANES))
+    cap = np.empty((1, 2, LANES))
+    kernels.rows_along(
+        path.breaks, path.coefficients, grid[stage : stage + 2], vlim, alim, values, bounds,
+        binomials(2 * path.degree), slope, low, high, cap,
+    )  # fmt: skip
+    if sampled is not None:
+        still = sampled.values[stage, :, :, 2]
+        excess = np.maximum(still - sampled.bounds[stage, :, 1], sampled.bounds[stage, :, 0] - still).max(axis=0)
+        e = int(excess.argmax())
+        if excess[e] > 0.0:
+            value = still[np.abs(still[:, e]).argmax(), e]
+            return f"{sampled.names[e]} is {value:.6g} even at rest; the limit is {sampled.bounds[stage, e].tolist()}"
+    names = [f"acceleration of coordinate {j}" for j in range(path.n) for _ in range(path.degree)]
+    names += ["velocity"] * (2 * path.degree - 1)
+    names += [name for name in (sampled.names if sampled is not None else ()) for _ in range(4)]
+    top, bottom = int(high[0, :, 0].argmin()), int(low[0, :, 0].argmax())
+    upper = names[top] if high[0, top, 0] < y_high else "the speed that can still be braked further on"
+    return f"{names[bottom]} and {upper} contradict each other at every speed"
+
+
+def make_grid(path: PolynomialPath, grid: int | ArrayLike, least: int = 1) -> Array:
+    """The grid with every break of the path in it."""
+    breaks = path.breaks
+    if isinstance(grid, (int, np.integer)):
+        if grid < 1:
+            raise InputError(f"grid is {grid}; expected a number of intervals ≥ 1, or the grid points")
+        parts = np.maximum(np.ceil(np.diff(breaks) * (int(grid) / (breaks[-1] - breaks[0])) - 1e-9), least)
+        out = np.empty(int(parts.sum()) + 1)
+        kernels.subdivide(breaks, parts, out)
+        return out
+    points = as_array(grid, "grid")
+    start, end = path.interval
+    if points.ndim != 1 or points.size < 2 or np.diff(points).min() <= 0.0 or points[0] != start or points[-1] != end:
+        raise InputError(f"grid must increase strictly from {start:.9g} to {end:.9g}, the interval of the path")
+    merged = np.union1d(points, breaks)
+    # grid points that nearly coincide with a break give way to it
+    is_break = np.isin(merged, breaks)
+    near = np.zeros(merged.size, dtype=np.bool_)
+    tight = np.diff(merged) < 1e-12 * (end - start)
+    near[:-1] |= tight & ~is_break[:-1]
+    near[1:] |= tight & ~is_break[1:]
+    return np.ascontiguousarray(merged[~near])
+
+
+def _refuse_unbounded(path: PolynomialPath, alim: Array) -> None:
     bounded = np.isfinite(alim).all(axis=1) | (np.abs(path.coefficients[:, 1:]).max(axis=(0, 1)) == 0.0)
     if not bounded.all():
         j = int(np.argmin(bounded))
@@ -103,87 +278,17 @@ def time_optimal(
             f"limits.acceleration[{j}] is {alim[j].tolist()}; a time-optimal motion needs a finite acceleration limit "
             "for every moving coordinate: pass Limits(velocity=…, acceleration=…)"
         )
-    s = _grid(path, grid, least)
-    extra = np.empty((s.size - 1, 0, 3))
-    return _solve(path, s, vlim * (1.0 - MARGIN), alim * (1.0 - MARGIN), extra, start_speed, end_speed)
 
 
-def _solve(
-    path: PolynomialPath, s: Array, vlim: Array, alim: Array, extra: Array, start_speed: float, end_speed: float
-) -> Timing:
-    count, size = s.size - 1, 4 * path.n * path.degree + extra.shape[1]
-    upper, lower = np.empty((count, size, 2)), np.empty((count, size, 2))
-    counts, cap = np.empty((count, 2), dtype=np.int64), np.empty((count, 2))
-    kernels.rows(
-        path.breaks, path.coefficients, s, vlim, alim, extra, _binomials(2 * path.degree), upper, lower, counts, cap
-    )
-    x, alpha, beta = np.zeros(count + 1), np.empty(count + 1), np.empty(count + 1)
-    status, stage = kernels.profile(
-        s,
-        upper,
-        lower,
-        counts,
-        cap,
-        _pinned(path, s),
-        start_speed**2,
-        end_speed**2,
-        extra.shape[1] == 0,
-        beta,
-        alpha,
-        x,
-    )
-    t, timing = np.zeros(count + 1), np.zeros((count, 3))
-    if status == kernels.OK:
-        kernels.times(s, x, t, timing)
-        return Timing(TimingStatus.SUCCESS, path, s, np.sqrt(x), t, timing)
-    place = float(s[min(stage, count)])
-    if status == kernels.START:
-        return Timing(
-            TimingStatus.START_SPEED, path, s, np.sqrt(x), t, timing, place,
-            f"start_speed is {start_speed:.6g}; expected at least {np.sqrt(max(alpha[0], 0.0)):.6g} and at most "
-            f"{np.sqrt(max(beta[0], 0.0)):.6g}",
-        )  # fmt: skip
-    kind = {kernels.END: TimingStatus.END_SPEED, kernels.STALLED: TimingStatus.STALLED}
-    return Timing(
-        kind.get(status, TimingStatus.INFEASIBLE), path, s, np.sqrt(x), t, timing, place,
-        f"end_speed is {end_speed:.6g}" if status == kernels.END else "the limits contradict each other here",
-    )  # fmt: skip
-
-
-def _grid(path: PolynomialPath, grid: int | ArrayLike, least: int = 1) -> Array:
-    """The grid with every break of the path in it."""
-    breaks = path.breaks
-    if isinstance(grid, (int, np.integer)):
-        if grid < 1:
-            raise InputError(f"grid is {grid}; expected a number of intervals ≥ 1, or the grid points")
-        lengths = np.diff(breaks)
-        parts = np.maximum(np.ceil(lengths / lengths.sum() * int(grid) - 1e-9), least).astype(np.int64)
-        step = np.repeat(lengths / parts, parts)
-        offset = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
-        return np.append(np.repeat(breaks[:-1], parts) + offset * step, breaks[-1])
-    points = as_array(grid, "grid")
-    start, end = path.interval
-    if points.ndim != 1 or points.size < 2 or np.diff(points).min() <= 0.0 or points[0] != start or points[-1] != end:
-        raise InputError(f"grid must increase strictly from {start:.9g} to {end:.9g}, the interval of the path")
-    merged = np.union1d(points, breaks)
-    # grid points that nearly coincide with a break give way to it
-    near = np.diff(merged, append=np.inf) < 1e-12 * (end - start)
-    return merged[~near | np.isin(merged, breaks)]
-
-
-def _pinned(path: PolynomialPath, s: Array) -> BoolArray:
-    """Grid points where the tangent jumps: the motion must rest there."""
-    pinned = np.zeros(s.size, dtype=np.bool_)
-    if path.breaks.size > 2:
-        size = np.abs(path(path.breaks[1:-1], 1)).max(axis=1)
-        kinks = np.abs(path.jumps(1)).max(axis=1) > 1e-9 * (1.0 + size)
-        pinned[np.searchsorted(s, path.breaks[1:-1][kinks])] = True
-    return pinned
-
-
-def _binomials(size: int) -> Array:
+@cache
+def binomials(size: int) -> Array:
+    """Pascal's triangle ``(size + 1, size + 1)``."""
     table = np.zeros((size + 1, size + 1))
     table[:, 0] = 1.0
     for i in range(1, size + 1):
         table[i, 1:] = table[i - 1, 1:] + table[i - 1, :-1]
     return table
+
+
+_NO_SAMPLES = np.empty((1, 3, 0, 3))
+_NO_BOUNDS = np.empty((1, 0, 2))

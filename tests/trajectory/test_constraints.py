@@ -1,0 +1,174 @@
+"""Torque, power and Cartesian limits: kept at all times, recomputed by others, and failures that name themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import apprehend as ap
+from apprehend import trajectory as tj
+from apprehend.errors import InputError, UnsuccessfulError
+
+
+@pytest.fixture(scope="module", params=["panda", "ur5"])
+def robot(request) -> ap.Robot:
+    try:
+        return ap.Robot.load(request.param)
+    except ap.errors.MissingDependencyError as error:
+        pytest.skip(str(error))
+
+
+def spline(robot: ap.Robot, seed: int) -> tj.Spline:
+    rng = np.random.default_rng(seed)
+    low, high = np.maximum(robot.limits.lower, -2.0), np.minimum(robot.limits.upper, 2.0)
+    return tj.Spline(rng.uniform(low, high, size=(4, robot.n)))
+
+
+def limits(robot: ap.Robot) -> tj.Limits:
+    return tj.Limits(velocity=robot.limits.velocity, acceleration=3.0 * np.minimum(robot.limits.acceleration, 10.0))
+
+
+def tool(robot: ap.Robot) -> str:
+    """The frame that most coordinates move."""
+    return max(robot.frame_names, key=lambda f: len(robot.chain(f)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_torques_stay_within_limits_at_all_times(robot: ap.Robot, seed: int) -> None:
+    path = spline(robot, seed)
+    still = np.abs(robot.gravity(path(np.linspace(0.0, 1.0, 300)))).max(axis=0)
+    effort = np.maximum(0.35 * robot.limits.effort, 1.3 * still)
+    timing = tj.time_optimal(path, limits(robot), constraints=[tj.TorqueLimits(robot, effort)], grid=100)
+    motion = timing.require_success().motion
+    assert timing.report.success
+    t = np.linspace(0.0, motion.duration, 4001)
+    torque = robot.inverse_dynamics(motion(t), motion(t, 1), motion(t, 2))
+    used = (np.abs(torque) / effort).max(axis=1)
+    assert used.max() <= 1.0 + 1e-9
+    free = tj.time_optimal(path, limits(robot), grid=100)
+    assert timing.duration >= free.duration * 0.999
+    assert used.max() > 0.9 or timing.duration == pytest.approx(free.duration, rel=1e-2)
+
+
+def test_torques_recomputed_by_pinocchio() -> None:
+    pin = pytest.importorskip("pinocchio")
+    example = pytest.importorskip("example_robot_data")
+    robot = ap.Robot.load("ur5")
+    peer = example.load("ur5")
+    assert peer.model.nq == robot.n
+    path = spline(robot, 5)
+    effort = np.array([60.0, 120.0, 60.0, 12.0, 12.0, 12.0])
+    timing = tj.time_optimal(path, limits(robot), constraints=[tj.TorqueLimits(robot, effort)], grid=150)
+    motion = timing.require_success().motion
+    order = [peer.model.joints[peer.model.getJointId(name)].idx_q for name in robot.joint_names]
+    for t in np.linspace(0.0, motion.duration, 500):
+        q, v, a = (np.empty(robot.n) for _ in range(3))
+        q[order], v[order], a[order] = motion(t), motion(t, 1), motion(t, 2)
+        torque = pin.rnea(peer.model, peer.data, q, v, a)[order]
+        assert (np.abs(torque) <= effort * (1 + 1e-6)).all()
+
+
+def test_cartesian_speed(robot: ap.Robot) -> None:
+    path, frame = spline(robot, 3), tool(robot)
+    speed = tj.CartesianSpeed(robot, frame, linear=0.3, angular=0.7)
+    motion = tj.time_optimal(path, limits(robot), constraints=[speed], grid=150).require_success().motion
+    t = np.linspace(0.0, motion.duration, 4001)
+    twist = np.einsum("mij,mj->mi", robot.jacobian(motion(t), frame), motion(t, 1))
+    linear, angular = np.linalg.norm(twist[:, :3], axis=1), np.linalg.norm(twist[:, 3:], axis=1)
+    assert linear.max() <= 0.3 + 1e-9
+    assert angular.max() <= 0.7 + 1e-9
+    assert max(linear.max() / 0.3, angular.max() / 0.7) > 0.99
+
+
+def test_cartesian_acceleration(robot: ap.Robot) -> None:
+    path, frame = spline(robot, 4), tool(robot)
+    bound = tj.CartesianAcceleration(robot, frame, linear=1.0)
+    motion = tj.time_optimal(path, limits(robot), constraints=[bound], grid=200).require_success().motion
+    t = np.linspace(0.0, motion.duration, 20001)
+    p = robot.fk(motion(t), frame)[:, :3, 3]
+    dt = t[1] - t[0]
+    acceleration = np.linalg.norm(p[2:] - 2 * p[1:-1] + p[:-2], axis=1) / dt**2
+    assert acceleration.max() <= 1.0 + 1e-3  # finite differences
+    assert np.median(acceleration) > 0.5
+
+
+def test_power(robot: ap.Robot) -> None:
+    path = spline(robot, 6)
+    motion = (
+        tj.time_optimal(path, limits(robot), constraints=[tj.PowerLimits(robot, 15.0)], grid=150)
+        .require_success()
+        .motion
+    )
+    t = np.linspace(0.0, motion.duration, 4001)
+    power = robot.inverse_dynamics(motion(t), motion(t, 1), motion(t, 2)) * motion(t, 1)
+    assert np.abs(power).max() <= 15.0 * (1 + 1e-9)
+    assert np.abs(power).max() > 10.0
+
+
+def test_a_torque_that_does_not_even_hold_the_arm_is_named(robot: ap.Robot) -> None:
+    path = spline(robot, 1)
+    still = np.abs(robot.gravity(path(np.linspace(0.0, 1.0, 300)))).max(axis=0)
+    j = int(still.argmax())
+    effort = robot.limits.effort.copy()
+    effort[j] = 0.5 * still[j]
+    timing = tj.time_optimal(path, limits(robot), constraints=[tj.TorqueLimits(robot, effort)])
+    assert timing.status is tj.TimingStatus.INFEASIBLE
+    with pytest.raises(UnsuccessfulError, match=f"At s = .*torque of '{robot.joint_names[j]}' is .* even at rest"):
+        timing.require_success()
+
+
+def test_contradicting_constraints_are_named() -> None:
+    class Pushing:
+        def rows(self, path, s):
+            one = np.ones((s.size, 1))
+            inside = ((s > 0.4) & (s < 0.5))[:, None] * 1.0
+            return tj.Rows(one, 0 * one, -20.0 * inside, np.zeros(1) - 1.0, np.full(1, np.inf), ("the push",))
+
+    path = tj.polyline([[0.0], [1.0]])
+    timing = tj.time_optimal(path, tj.Limits(velocity=1.0, acceleration=2.0), constraints=[Pushing()], grid=50)
+    assert not timing.success
+    assert "the push" in timing.explain()
+
+
+def test_custom_path_is_replaced_by_polynomials() -> None:
+    class Circle:
+        n = 2
+        interval = (0.0, np.pi)
+
+        def __call__(self, s, order=0, /):
+            s = np.asarray(s)
+            shift = order * np.pi / 2
+            return np.stack([np.cos(s + shift), np.sin(s + shift)], axis=-1)
+
+    timing = tj.time_optimal(Circle(), tj.Limits(velocity=1.0, acceleration=1.0), grid=300)
+    assert timing.report.success
+    q = timing.motion.sample(count=500).position
+    np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1.0, atol=1e-8)
+    with pytest.raises(InputError, match="path is list; expected a Path"):
+        tj.time_optimal([[0.0], [1.0]], tj.Limits(acceleration=1.0))
+
+    class Jump(Circle):
+        def __call__(self, s, order=0, /):
+            s = np.asarray(s)
+            values = (np.sign(s - 1.0), 0 * s, 0 * s)[order]
+            return np.stack([values, values], axis=-1)
+
+    with pytest.raises(InputError, match=r"not smooth near s = 1"):
+        tj.as_polynomial(Jump())
+
+
+@pytest.mark.parametrize(
+    "call, message",
+    [
+        (lambda r: tj.TorqueLimits(r, np.inf), "effort is infinite for every joint"),
+        (lambda r: tj.TorqueLimits(r, 0.0), "expected a positive torque"),
+        (lambda r: tj.TorqueLimits(r, margin=1.0), "margin is 1.0"),
+        (lambda r: tj.PowerLimits(r, -1.0), "expected a positive power"),
+        (lambda r: tj.CartesianSpeed(r, tool(r)), "a linear limit, an angular limit, or both"),
+        (lambda r: tj.CartesianSpeed(r, tool(r), linear=-1.0), "linear is -1.0"),
+        (lambda r: tj.CartesianSpeed(r, "nowhere", linear=1.0), "no .*named 'nowhere'"),
+    ],
+)
+def test_bad_input(robot: ap.Robot, call, message: str) -> None:
+    with pytest.raises((InputError, ap.errors.UnknownNameError), match=message):
+        call(robot)
