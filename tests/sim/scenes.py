@@ -97,7 +97,7 @@ class Held:
 
 
 def hold(name: str, body: Body, force: float, *, offset: Array | None = None, physics: Physics | None = None) -> Held:
-    """Close robot *name*'s hand with *force* around *body*, which is at the tcp of its width, moved by *offset* (4, 4)."""
+    """Close *name*'s hand with *force* around *body*, which is at the tcp of its width, moved by *offset* (4, 4)."""
     at = rig(name)
     shift = np.eye(4) if offset is None else offset
     width = float(np.ptp(body.vertices @ shift[0, :3]))

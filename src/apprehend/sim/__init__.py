@@ -7,6 +7,7 @@
 >>> grip(world, gripper, 20.0, arm).require_success()
 """
 
+from .camera import View, hand_camera, look
 from .contacts import ContactTable, Touch
 from .control import JointController, Load, Saturation
 from .gripper import Gripper, GripResult, GripStatus, JawState, grip
@@ -17,5 +18,6 @@ from .world import Controller, SettleResult, SettleStatus, World
 
 __all__ = [
     "ContactTable", "Controller", "Gripper", "GripResult", "GripStatus", "JawState", "JointController", "Load",
-    "Physics", "Plant", "Recording", "Saturation", "SettleResult", "SettleStatus", "Touch", "World", "build", "grip",
+    "Physics", "Plant", "Recording", "Saturation", "SettleResult", "SettleStatus", "Touch", "View", "World", "build",
+    "grip", "hand_camera", "look",
 ]  # fmt: skip

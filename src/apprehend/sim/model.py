@@ -190,10 +190,7 @@ def _add_joint(body: Any, joint: Joint, physics: Physics) -> None:
     made = body.add_joint(name=f"joint:{joint.name}", type=kind, axis=joint.axis)
     made.armature = joint.armature
     made.frictionloss = joint.friction
-    if np.ndim(made.damping):
-        made.damping[0] = joint.damping
-    else:  # releases before 3.7
-        made.damping = joint.damping
+    made.damping[0] = joint.damping
     made.limited = mujoco.mjtLimited.mjLIMITED_FALSE
     lower, upper = joint.limits.lower, joint.limits.upper
     if joint.mimic is None and joint.type is not JointType.CONTINUOUS and np.isfinite([lower, upper]).all():
