@@ -185,10 +185,11 @@ def _poses(facets: _Facets, com: Array, basin: IntArray, left: list[tuple[int, i
 
 
 def _turn_down(direction: Array) -> Array:
-    """The shortest rotation that maps the unit vector *direction* to −z."""
-    x, y, z = direction
-    if z > 1.0 - 1e-12:
-        return np.diag([1.0, -1.0, -1.0])
-    axis = np.array([-y, x, 0.0])  # direction × (−z)
+    """A rotation that maps the unit vector *direction* to −z: the shortest one, or for a vector that points up the
+    shortest to +z and half a turn about x, so that nothing is divided by a small number."""
+    x, y, z = direction / np.linalg.norm(direction)
+    up = z > 0.0
+    axis = np.array([y, -x, 0.0]) if up else np.array([-y, x, 0.0])  # direction × ±z
     K = np.array([[0.0, 0.0, axis[1]], [0.0, 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return np.asarray(np.eye(3) + K + K @ K / (1.0 - z))
+    R = np.eye(3) + K + K @ K / (1.0 + abs(z))
+    return np.asarray(np.diag([1.0, -1.0, -1.0]) @ R if up else R)
