@@ -1,0 +1,106 @@
+"""The command line as a person meets it: it works, it speaks JSON, and mistakes are one paragraph and exit code 2."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CUBE = "\n".join(
+    [f"v {x} {y} {z}" for x in (0, 0.04) for y in (0, 0.04) for z in (0, 0.04)]
+    + [f"f {a} {b} {c}" for a, b, c in (
+        (1, 2, 4), (1, 4, 3), (5, 7, 8), (5, 8, 6), (1, 5, 6), (1, 6, 2), (3, 4, 8), (3, 8, 7), (1, 3, 7), (1, 7, 5),
+        (2, 6, 8), (2, 8, 4))]
+)  # fmt: skip
+
+
+def run(*args: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    program = "from apprehend.cli import main; main()"
+    return subprocess.run([sys.executable, "-c", program, *args], capture_output=True, text=True, cwd=cwd, timeout=280)
+
+
+def test_help_lists_the_commands() -> None:
+    result = run("--help")
+    assert result.returncode == 0
+    assert "pick" in result.stdout
+    assert "view" in result.stdout
+
+
+def test_picking_a_mesh_writes_the_episode_and_the_report(tmp_path: Path) -> None:
+    (tmp_path / "cube.obj").write_text(CUBE)
+    result = run("pick", "cube.obj", "--mass", "0.1", "--seed", "1", "--out", "out", "--json", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    data = json.loads(result.stdout)
+    assert data["verdict"]["success"] is True
+    assert (tmp_path / "out" / "episode.json").exists()
+    report = (tmp_path / "out" / "report.html").read_text()
+    assert "<html" in report
+    assert "http://" not in report.replace("http://www.w3.org/", "")
+    assert "https://" not in report
+
+
+NAN = CUBE.replace("v 0 0 0.04", "v 0 nan 0.04")
+BIG = "\n".join(
+    "v " + " ".join(str(float(x) * 1000) for x in line.split()[1:]) if line.startswith("v") else line
+    for line in CUBE.splitlines()
+)
+BOMB = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;">]><robot name="x"><link name="&b;"/></robot>'
+
+MISTAKES = {
+    "missing mesh": (["pick", "nothing.obj"], "nothing.obj"),
+    "unknown household object": (["pick", "mugg"], "Did you mean 'mug'"),
+    "unknown robot": (["pick", "mug", "--robot", "ur5ee"], "ur5e"),
+    "unknown hand": (["pick", "mug", "--hand", "robotiq_2f_58"], "robotiq_2f_85"),
+    "zero mass": (["pick", "cube.obj", "--mass", "0"], "mass"),
+    "NaN mass": (["pick", "cube.obj", "--mass", "nan"], "mass"),
+    "negative friction": (["pick", "cube.obj", "--friction", "-1"], "friction"),
+    "NaN in the mesh": (["pick", "nan.obj"], "nan.obj"),
+    "millimetres": (["pick", "big.obj"], "mm"),
+    "wrong kind of file": (["pick", "robot.urdf"], ".toml"),
+    "malformed scene": (["pick", "bad.toml"], "bad.toml"),
+    "unknown key": (["pick", "key.toml"], "Did you mean 'robot'"),
+    "hostile XML": (["pick", "mug", "--robot", "bomb.urdf"], "bomb.urdf"),
+    "malformed XML": (["pick", "mug", "--robot", "broken.urdf"], "broken.urdf"),
+    "two descriptions": (["pick", "key.toml", "--robot", "panda"], "--robot"),
+    "no episode": (["view", "out"], "out"),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_mistakes_are_one_paragraph(case: str, tmp_path: Path) -> None:
+    args, expected = MISTAKES[case]
+    files = {
+        "cube.obj": CUBE, "nan.obj": NAN, "big.obj": BIG, "bad.toml": "[robot\n", "key.toml": '[robbot]\narm="ur5e"\n',
+        "bomb.urdf": BOMB, "broken.urdf": "<robot><link></robot>", "robot.urdf": "<robot/>",
+    }  # fmt: skip
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "out").mkdir()
+    result = run(*args, *(["--out", "new"] if args[0] == "pick" else []), cwd=tmp_path)
+    assert result.returncode == 2, result.stdout + result.stderr
+    assert result.stderr.startswith("error: ")
+    assert expected in result.stderr
+    assert "Traceback" not in result.stderr
+    assert "\n\n" not in result.stderr.strip()
+    assert not (tmp_path / "new").exists()
+
+
+def test_wrong_options_are_explained() -> None:
+    result = run("pick", "--sed", "1")
+    assert result.returncode == 2
+    assert "--sed" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_a_failed_pick_is_exit_code_one(tmp_path: Path) -> None:
+    crate = "\n".join(
+        "v " + " ".join(str(float(x) * 5) for x in line.split()[1:]) if line.startswith("v") else line
+        for line in CUBE.splitlines()
+    )
+    (tmp_path / "crate.obj").write_text(crate)
+    result = run("pick", "crate.obj", "--mass", "1", cwd=tmp_path)
+    assert result.returncode == 1
+    assert "failed" in result.stdout
