@@ -1,4 +1,7 @@
-"""Kernels on one configuration of a chain, without lanes: for calls in a loop, where 16 lanes would be paid for one."""
+"""Kernels on one configuration of a chain, without lanes: for calls in a loop, where 16 lanes would be paid for one.
+
+Also for what is rarely asked in millions.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +16,22 @@ from .chain import BODY, REVOLUTE, SPATIAL
 @kernel
 def chain_single(model, q, reference, out, jacobian):
     """Pose ``out (4, 4)`` and, unless it has no rows, ``jacobian (6, n)`` of one ``q (n,)``; 1 if q is not finite."""
-    m = model.kind.shape[0]
-    place = model.place
     bad = 0
     for j in range(q.shape[0]):
         if not math.isfinite(q[j]):
             bad = 1
-    axes = np.empty((m, 6))
+    axes = np.empty((model.kind.shape[0], 6))
+    _walk(model, q, axes, out)
+    if jacobian.shape[0]:
+        _fill_jacobian(model, axes, reference, out, jacobian)
+    return bad
+
+
+@kernel
+def _walk(model, q, axes, out):
+    """Axes of the joints ``(m, 6)`` (point, direction) and pose ``out (4, 4)`` of the chain's end."""
+    m = model.kind.shape[0]
+    place = model.place
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
     x = y = z = 0.0
     for i in range(m + 1):
@@ -77,9 +89,6 @@ def chain_single(model, q, reference, out, jacobian):
     out[3, 1] = 0.0
     out[3, 2] = 0.0
     out[3, 3] = 1.0
-    if jacobian.shape[0]:
-        _fill_jacobian(model, axes, reference, out, jacobian)
-    return bad
 
 
 @kernel
@@ -115,3 +124,46 @@ def _fill_jacobian(model, axes, reference, pose, jacobian):
                 vx, vy, vz = jacobian[h, c], jacobian[h + 1, c], jacobian[h + 2, c]
                 for k in range(3):
                     jacobian[h + k, c] = pose[0, k] * vx + pose[1, k] * vy + pose[2, k] * vz
+
+
+@kernel
+def chain_rates(model, q, qd, jacobians, rates, poses):
+    """Spatial Jacobians ``(N, 6, n)``, their time derivatives, and poses ``(N, 4, 4)``, of rows of q, q̇ ``(N, n)``.
+
+    Column i of the spatial Jacobian is fixed to the body before joint i, so its rate is the bracket of that body's
+    velocity with it: ``ξ̇ = V × ξ``.
+    """
+    axes = np.empty((model.kind.shape[0], 6))
+    for row in range(q.shape[0]):
+        _walk(model, q[row], axes, poses[row])
+        _columns(model, axes, qd[row], jacobians[row], rates[row])
+
+
+@kernel
+def _columns(model, axes, qd, jacobian, rate):
+    """Spatial Jacobian and its rate from the joint axes."""
+    jacobian[:] = 0.0
+    rate[:] = 0.0
+    V = np.zeros(6)
+    xi = np.zeros(6)
+    for i in range(axes.shape[0]):
+        px, py, pz, zx, zy, zz = axes[i, 0], axes[i, 1], axes[i, 2], axes[i, 3], axes[i, 4], axes[i, 5]
+        if model.kind[i] == REVOLUTE:
+            xi[0] = py * zz - pz * zy
+            xi[1] = pz * zx - px * zz
+            xi[2] = px * zy - py * zx
+            xi[3], xi[4], xi[5] = zx, zy, zz
+        else:
+            xi[0], xi[1], xi[2] = zx, zy, zz
+            xi[3], xi[4], xi[5] = 0.0, 0.0, 0.0
+        c = model.coordinate[i]
+        gain = model.gain[i, 0]
+        rate[0, c] += gain * (V[4] * xi[2] - V[5] * xi[1] + V[1] * xi[5] - V[2] * xi[4])
+        rate[1, c] += gain * (V[5] * xi[0] - V[3] * xi[2] + V[2] * xi[3] - V[0] * xi[5])
+        rate[2, c] += gain * (V[3] * xi[1] - V[4] * xi[0] + V[0] * xi[4] - V[1] * xi[3])
+        rate[3, c] += gain * (V[4] * xi[5] - V[5] * xi[4])
+        rate[4, c] += gain * (V[5] * xi[3] - V[3] * xi[5])
+        rate[5, c] += gain * (V[3] * xi[4] - V[4] * xi[3])
+        for k in range(6):
+            jacobian[k, c] += gain * xi[k]
+            V[k] += gain * qd[c] * xi[k]

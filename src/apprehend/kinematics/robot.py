@@ -18,13 +18,11 @@ from ..kernels import chain as chain_kernels
 from ..kernels import single as single_kernels
 from ..kernels import tree as tree_kernels
 from ..kernels.chain import ChainModel
+from ..kernels.coriolis import coriolis_matrix
 from ..kernels.tree import TreeModel
 from ..robots.description import Description, Joint, JointType
-from . import dynamics
+from . import differential, dynamics
 from .model import chain_model, frame_names, tree_model
-
-REFERENCES = ("spatial", "body", "mixed")
-"""Names of the three Jacobians, in the order of the kernels' numbers."""
 
 GRAIN = 2048
 """Smallest share of a batch that is worth a thread."""
@@ -217,11 +215,17 @@ class Robot:
         J, T = self._jacobian(q, frame, reference, poses=True)
         return T, J
 
+    def jacobian_derivative(
+        self, q: ArrayLike, qd: ArrayLike, frame: str, reference: str = "mixed"
+    ) -> tuple[Array, Array]:
+        """Jacobian and its time derivative along q̇, both ``(..., 6, n)``."""
+        return differential.jacobian_derivative(self, q, qd, frame, reference)
+
     def _jacobian(self, q: ArrayLike, frame: str, reference: str, *, poses: bool) -> tuple[Array, Array]:
         try:
-            kind = REFERENCES.index(reference)
+            kind = differential.REFERENCES.index(reference)
         except ValueError:
-            choice(reference, "reference", REFERENCES)
+            choice(reference, "reference", differential.REFERENCES)
             raise
         q = self._read(q)
         chain = self._chains.get(frame) or self.chain_model(frame)
@@ -246,7 +250,7 @@ class Robot:
         q, q̇, q̈ broadcast; absent ones are zero. Recursive Newton–Euler; rotor inertias (``armature``) are included,
         joint friction and damping are not.
         """
-        shape, rows = self._read_rows(q=q, qd=qd, qdd=qdd)
+        shape, rows = self.read_rows(q=q, qd=qd, qdd=qdd)
         out = np.empty((math.prod(shape), self.n))
         bad = dynamics.inverse_dynamics(self.model, rows[0], rows[1], rows[2], out)
         if bad >= 0:
@@ -271,7 +275,7 @@ class Robot:
 
         Raises `InputError` if the mass matrix is singular: a joint that moves no inertia.
         """
-        shape, rows = self._read_rows(q=q, qd=qd, tau=tau)
+        shape, rows = self.read_rows(q=q, qd=qd, tau=tau)
         out = np.empty((math.prod(shape), self.n))
         bad, row, coordinate = dynamics.forward_dynamics(self.model, rows[0], rows[1], rows[2], out)
         if bad >= 0:
@@ -282,6 +286,15 @@ class Robot:
                 "links that it moves have no inertia of their own; give them one, or the joint an armature"
             )
         return out.reshape(*shape, self.n)
+
+    def coriolis(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """The matrix C(q, q̇) ``(..., n, n)`` of Coriolis and centrifugal torques C q̇, with Ṁ − 2 C antisymmetric."""
+        shape, (rows, rates) = self.read_rows(q=q, qd=qd)
+        out = np.empty((math.prod(shape), self.n, self.n))
+        if coriolis_matrix(self.model, rows, rates, out) >= 0:
+            self._refuse_one(0, q=q)
+            self._refuse_one(0, qd=qd)
+        return out.reshape(*shape, self.n, self.n)
 
     def com(self, q: ArrayLike) -> Array:
         """Centre of mass of the whole robot in the world, ``(..., 3)``; its mass is `mass`."""
@@ -312,7 +325,7 @@ class Robot:
             raise InputError(f"{name} has shape {array.shape}; expected (..., {self.n}) for the joints {joints}")
         return array if array.flags.writeable else array.copy()
 
-    def _read_rows(self, **values: ArrayLike | None) -> tuple[tuple[int, ...], list[Array]]:
+    def read_rows(self, **values: ArrayLike | None) -> tuple[tuple[int, ...], list[Array]]:
         """Broadcast joint vectors against each other: their batch shape, and each as rows ``(N, n)``; absent: none."""
         given = {name: self._read(value, name) for name, value in values.items() if value is not None}
         shapes = {name: array.shape[:-1] for name, array in given.items()}
