@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +11,17 @@ from numpy.typing import ArrayLike
 from ..arrays import as_pose
 from ..errors import InputError, unknown_name
 from .description import Description, Joint, JointType, Mimic
+from .poses import motion
 
 
 def renamed(description: Description, prefix: str) -> Description:
     """*description* with *prefix* put before the name of every link and joint."""
     if not prefix:
         return description
+
+    def put(arms: Mapping[str, float]) -> dict[str, float]:
+        return {prefix + joint: arm for joint, arm in arms.items()}
+
     joints = tuple(
         replace(
             j, name=prefix + j.name, parent=prefix + j.parent, child=prefix + j.child,
@@ -31,6 +36,12 @@ def renamed(description: Description, prefix: str) -> Description:
         joints=joints,
         home={prefix + n: v for n, v in description.home.items()},
         allowed_collisions=frozenset(frozenset(prefix + n for n in pair) for pair in description.allowed_collisions),
+        tendons=tuple(replace(t, name=prefix + t.name, arms=put(t.arms)) for t in description.tendons),
+        actuators=tuple(replace(a, name=prefix + a.name, arms=put(a.arms)) for a in description.actuators),
+        loops=tuple(
+            replace(loop, name=prefix + loop.name, first=prefix + loop.first, second=prefix + loop.second)
+            for loop in description.loops
+        ),
         tool=prefix + description.tool if description.tool else "",
     )
 
@@ -67,6 +78,9 @@ def attach(
         home={**base.home, **hand.home},
         allowed_collisions=base.allowed_collisions | hand.allowed_collisions,
         repairs=base.repairs + hand.repairs,
+        tendons=base.tendons + hand.tendons,
+        actuators=base.actuators + hand.actuators,
+        loops=base.loops + hand.loops,
         tool=hand.tool or base.tool,
     )
 
@@ -106,7 +120,7 @@ def _restricted(description: Description, root: str, kept: set[str], joints: Ite
     chosen = list(joints)
     inside = {j.name for j in chosen}
     fixed = [
-        replace(j, type=JointType.FIXED, mimic=None, pose=j.pose @ _motion(j, _outside_value(description, j.mimic)))
+        replace(j, type=JointType.FIXED, mimic=None, pose=j.pose @ motion(j, _outside_value(description, j.mimic)))
         if j.mimic is not None and j.mimic.joint not in inside
         else j
         for j in chosen
@@ -118,21 +132,12 @@ def _restricted(description: Description, root: str, kept: set[str], joints: Ite
         joints=tuple(fixed),
         home={n: v for n, v in description.home.items() if n in inside},
         allowed_collisions=frozenset(p for p in description.allowed_collisions if p <= kept),
+        tendons=tuple(t for t in description.tendons if t.arms.keys() <= inside),
+        actuators=tuple(a for a in description.actuators if a.arms.keys() <= inside),
+        loops=tuple(loop for loop in description.loops if {loop.first, loop.second} <= kept),
         tool=description.tool if description.tool in kept else "",
     )
 
 
 def _outside_value(description: Description, mimic: Mimic) -> float:
     return mimic.multiplier * description.home.get(mimic.joint, 0.0) + mimic.offset
-
-
-def _motion(joint: Joint, q: float) -> np.ndarray:
-    """T(q) of one joint: a turn about, or a shift along, its axis."""
-    T = np.eye(4)
-    if joint.type is JointType.PRISMATIC:
-        T[:3, 3] = joint.axis * q
-    else:
-        x, y, z = joint.axis
-        K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        T[:3, :3] += np.sin(q) * K + (1.0 - np.cos(q)) * (K @ K)
-    return T

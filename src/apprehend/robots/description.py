@@ -106,6 +106,50 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class Tendon:
+    """A length that is linear in the joints: ``offset + Σ arms[joint] * q[joint]``, kept between *lower* and *upper*.
+
+    The *arms* are in m per rad (or per m) and may name mimicking joints. A coupling of joints is a tendon, too.
+    """
+
+    name: str
+    arms: Mapping[str, float]
+    lower: float = -INFINITE
+    upper: float = INFINITE
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """A motor whose force or torque f, between *lower* and *upper*, acts on joints: ``τ[joint] = arms[joint] * f``.
+
+    A gear ratio or a lever arm is one arm; a motor that pulls a tendon has the tendon's arms.
+    """
+
+    name: str
+    arms: Mapping[str, float]
+    lower: float = -INFINITE
+    upper: float = INFINITE
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A closed chain that was cut: *first* and *second* are links whose frames T_first, T_second must meet again.
+
+    *free* says what they may do to each other: ``"point"`` (positions coincide, orientations are free), ``"pose"``
+    (nothing), or ``"revolute"``, ``"continuous"``, ``"prismatic"`` along *axis* of the first frame.
+    """
+
+    name: str
+    first: str
+    second: str
+    T_first: Array  # (4, 4), in the frame of the link *first*
+    T_second: Array  # (4, 4), in the frame of the link *second*
+    free: str = "pose"
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+
+
+@dataclass(frozen=True)
 class Repair:
     """Something in the file that had to be corrected to be usable: what, where, and what was done."""
 
@@ -129,6 +173,9 @@ class Description:
     allowed_collisions: frozenset[frozenset[str]] = frozenset()  # pairs of links that may touch
     repairs: tuple[Repair, ...] = ()
     source: Path | None = None
+    tendons: tuple[Tendon, ...] = ()
+    actuators: tuple[Actuator, ...] = ()
+    loops: tuple[Loop, ...] = ()  # closed chains that were cut on request; nothing here closes them
     tool: str = ""  # frame that carries a tool, or at which grasps and targets are meant; "" if not known
 
     def joint(self, name: str) -> Joint:

@@ -43,6 +43,9 @@ def _package_root(folder: Path) -> Path:
     for candidate in (folder, *list(folder.parents)[:3]):
         if (candidate / "package.xml").is_file():
             return candidate
+    for site in shared_folders():
+        if folder.is_relative_to(site) and folder != site:  # what comes with a wheel stays within that wheel
+            return site / folder.relative_to(site).parts[0]
     above = folder.parent
     return above if folder.name.lower() in _SUBFOLDERS and above != above.parent and above != Path.home() else folder
 
@@ -102,6 +105,10 @@ class MeshPaths:
             f"{where}: mesh {name!r} does not exist (looked for {tried}); "
             "pass packages=folder of the meshes, or meshes='ignore' to load without geometry"
         )
+
+    def may_read(self, path: Path) -> bool:
+        """Whether the resolved *path* lies in an allowed folder."""
+        return any(path.is_relative_to(a) for a in self.allowed)
 
     def _readable(self, path: Path, name: str, where: str) -> Path:
         if path.suffix.lower() not in MESH_SUFFIXES:

@@ -31,7 +31,7 @@ def ordered(links: Mapping[str, Link], joints: Iterable[Joint], where: Where) ->
             raise DescriptionError(
                 f"{where(joint.name)}: closed chain: link {joint.child!r} is the child of joint {first.name!r} (from "
                 f"{first.parent!r}) and of joint {joint.name!r} (from {joint.parent!r}); a tree gives every link one "
-                "parent. Cut the loop by removing one of the two joints"
+                "parent. Pass loops='cut' to read the tree without the second joint, or remove one of the two"
             )
         carried[joint.child] = joint
         children[joint.parent].append(joint)

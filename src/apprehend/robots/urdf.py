@@ -25,21 +25,29 @@ from .description import (
     JointLimits,
     JointType,
     Link,
+    Loop,
     Mimic,
     Repair,
     Shape,
     ShapeKind,
 )
-from .markup import Document, extension_attribute, local, plain_children, prefixed, read_text
+from .markup import Document, extension_attribute, local, plain_children, read_text
 from .paths import MeshPaths, Packages
+from .poses import from_rpy
 from .tree import check_limits, ordered, resolved_mimics
+from .urdf_extras import actuators, filter_groups
 
 Rgba = tuple[float, float, float, float]
 _JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
 
 
 def read_urdf(
-    path: str | Path, *, packages: Packages = None, meshes: str = "require", inertias: str = "repair"
+    path: str | Path,
+    *,
+    packages: Packages = None,
+    meshes: str = "require",
+    inertias: str = "repair",
+    loops: str = "refuse",
 ) -> Description:
     """Read a URDF file.
 
@@ -48,7 +56,7 @@ def read_urdf(
     ``"refuse"``. Raises `DescriptionError` or `MeshError` with file and line.
     """
     path = Path(path)
-    return parse_urdf(read_text(path), path, packages=packages, meshes=meshes, inertias=inertias)
+    return parse_urdf(read_text(path), path, packages=packages, meshes=meshes, inertias=inertias, loops=loops)
 
 
 def parse_urdf(
@@ -58,19 +66,21 @@ def parse_urdf(
     packages: Packages = None,
     meshes: str = "require",
     inertias: str = "repair",
+    loops: str = "refuse",
 ) -> Description:
     """Read URDF from *text*; relative mesh names count from the folder of *source*. Options as in `read_urdf`."""
     choice(meshes, "meshes", ("require", "ignore"))
     choice(inertias, "inertias", ("repair", "keep", "refuse"))
+    choice(loops, "loops", ("refuse", "cut"))
     data = text.encode() if isinstance(text, str) else text
-    return _Reader(Document(data, source), packages, meshes, inertias).read()
+    return _Reader(Document(data, source), packages, meshes, inertias, loops).read()
 
 
 class _Reader:
-    def __init__(self, document: Document, packages: Packages, meshes: str, inertias: str) -> None:
+    def __init__(self, document: Document, packages: Packages, meshes: str, inertias: str, loops: str) -> None:
         self.doc = document
         self.paths = MeshPaths(document.source, packages)
-        self.meshes, self.inertias = meshes, inertias
+        self.meshes, self.inertias, self.cut = meshes, inertias, loops == "cut"
         self.materials: dict[str, Rgba] = {}
         self.links: dict[str, Link] = {}
         self.link_at: dict[str, Any] = {}
@@ -92,18 +102,35 @@ class _Reader:
             self._link(element)
         for element in plain_children(root, "joint"):
             self._joint(element)
+        loops = self._cut_loops() if self.cut else ()
         top, joints = ordered(self.links, self.joints.values(), self._where)
         joints = resolved_mimics(joints, self._where, doc.repairs)
         self._massless(joints)
+        motors = actuators(doc, self.joints)
         return Description(
             name=root.get("name") or doc.source.stem,
             root=top,
             links=self.links,
             joints=joints,
-            allowed_collisions=self._filter_groups(root),
+            allowed_collisions=filter_groups(doc, self.links),
             repairs=tuple(doc.repairs),
             source=doc.source,
+            actuators=motors,
+            loops=loops,
         )
+
+    def _cut_loops(self) -> tuple[Loop, ...]:
+        """Remove every joint whose child already has a parent, and return what it demanded."""
+        loops, carried = [], set()
+        for joint in list(self.joints.values()):
+            if joint.child in carried and joint.parent in self.links:
+                free = "pose" if joint.type is JointType.FIXED else joint.type.value
+                loops.append(Loop(joint.name, joint.parent, joint.child, joint.pose, np.eye(4), free, joint.axis))
+                self.doc.repair(self.joint_at[joint.name], f"joint {joint.name!r} closes a chain at {joint.child!r}",
+                                "cut it, as asked")  # fmt: skip
+                del self.joints[joint.name]
+            carried.add(joint.child)
+        return tuple(loops)
 
     def _where(self, joint: str) -> str:
         element = self.joint_at.get(joint, self.doc.root)
@@ -238,7 +265,7 @@ class _Reader:
             return np.eye(4)
         xyz = self.doc.numbers(origin, "xyz", 3, what, (0.0, 0.0, 0.0))
         rpy = self.doc.numbers(origin, "rpy", 3, what, (0.0, 0.0, 0.0))
-        return pose_from(xyz, rpy)
+        return from_rpy(xyz, rpy)
 
     # ---- joints
 
@@ -357,35 +384,3 @@ class _Reader:
             parent = link
         names = ", ".join(f"{name}_{s[0]}" for s in steps)
         self.doc.repair(element, f"joint {name!r} is {kind}", f"read as a chain of single joints: {names}")
-
-    def _filter_groups(self, root: Any) -> frozenset[frozenset[str]]:
-        """Pairs of links that may touch, from ``drake:collision_filter_group``."""
-        groups: dict[str, tuple[set[str], set[str]]] = {}
-        for element in root:
-            if local(element) != "collision_filter_group" or not prefixed(element):
-                continue
-            members = {str(e.get("link")) for e in element if local(e) == "member"} & self.links.keys()
-            ignored = {str(e.get("name")) for e in element if local(e) == "ignored_collision_filter_group"}
-            groups[str(element.get("name"))] = (members, ignored)
-        pairs = {
-            frozenset((a, b))
-            for members, ignored in groups.values()
-            for other in ignored & groups.keys()
-            for a in members
-            for b in groups[other][0]
-            if a != b
-        }
-        return frozenset(pairs)
-
-
-def pose_from(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Array:
-    """Pose ``(4, 4)`` from a position and extrinsic xyz angles: R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    (cr, cp, cy), (sr, sp, sy) = [math.cos(a) for a in rpy], [math.sin(a) for a in rpy]
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, xyz[0]],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, xyz[1]],
-            [-sp, cp * sr, cp * cr, xyz[2]],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
