@@ -1,5 +1,6 @@
 """Robots and hands that compute: forward kinematics, Jacobians, dynamics, manipulability."""
 
+from .dh import DHRow, DHTable, dh_table, dh_transform, inverse_dh_transform
 from .differential import (
     StaticsResult,
     StaticsStatus,
@@ -15,6 +16,8 @@ from .jaw import ParallelJaw
 from .robot import Limits, Robot
 
 __all__ = [
+    "DHRow",
+    "DHTable",
     "Finger",
     "Hand",
     "Limits",
@@ -24,7 +27,10 @@ __all__ = [
     "StaticsResult",
     "StaticsStatus",
     "acceleration",
+    "dh_table",
+    "dh_transform",
     "frame_wrench",
+    "inverse_dh_transform",
     "joint_torques",
     "leaf_to_root_jacobian",
     "rpy_jacobian",
