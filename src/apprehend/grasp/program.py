@@ -1,8 +1,9 @@
-"""Cone programs over contact forces: from arrays of problems to lanes and back."""
+"""Cone programs over contact forces, in batches."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -11,9 +12,9 @@ from ..kernels import cone
 from ..parallel import over_ranges
 from .contact import Contact, ContactModel
 
-TOLERANCE = 1e-8
+TOLERANCE = 1e-9
 """Relative residuals and duality gap at which a cone program counts as solved."""
-ACCEPTABLE = 1e-6
+ACCEPTABLE = 1e-7
 """What still counts as solved where rounding stops the method earlier."""
 MOST_STEPS = 50
 
@@ -33,56 +34,36 @@ class Solutions:
     steps: Array
 
 
-def _lanes(problems: Array, blocks: int) -> Array:
-    """``(N, …)`` to ``(blocks, …, LANES)``; padding repeats problem 0."""
-    missing = blocks * cone.LANES - len(problems)
-    if missing:
-        problems = np.concatenate([problems, np.broadcast_to(problems[:1], (missing, *problems.shape[1:]))])
-    shaped = problems.reshape(blocks, cone.LANES, *problems.shape[1:])
-    return np.ascontiguousarray(np.moveaxis(shaped, 1, -1))
-
-
-def _problems(lanes: Array, count: int) -> Array:
-    back = np.moveaxis(lanes, -1, 1)
-    return np.ascontiguousarray(back.reshape(-1, *back.shape[2:])[:count])
-
-
 def solve(A: Array, b: Array, c: Array, cones: tuple[int, ...], Q: Array | None = None) -> Solutions:
     """Minimise ``½ xᵀ diag(Q) x + cᵀ x`` over ``A x = b``, x in the product of *cones* (1: half-line, k: second order).
 
     ``A (N, rows, n)``, ``b (N, rows)``, ``c, Q (N, n)``; axes of length 1 broadcast over the N problems.
     """
     count = max(len(A), len(b), len(c))
-    rows, n = A.shape[1:]
-    A = np.broadcast_to(A, (count, rows, n))
-    b, c = np.broadcast_to(b, (count, rows)), np.broadcast_to(c, (count, n))
-    quadratic = np.zeros(len(cones), np.bool_)
-    if Q is None:
-        Q = np.zeros((1, n))
-    sizes = np.array(cones, np.int64)
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
-    offsets = np.concatenate([[0], np.cumsum(sizes**2)]).astype(np.int64)
-    blocks = -(-count // cone.LANES)
-    A_l, b_l, c_l = _lanes(A, blocks), _lanes(b, blocks), _lanes(c, blocks)
-    Q_l = _lanes(np.broadcast_to(Q, (count, n)), blocks)
-    x, y, z = np.empty_like(c_l), np.empty_like(b_l), np.empty_like(c_l)
-    status, measures = np.empty((blocks, cone.LANES), np.int64), np.zeros((blocks, 5, cone.LANES))
+    n, rows = A.shape[2], A.shape[1]
+    sizes, starts, offsets = _layout(cones)
+    Q = np.zeros((1, n)) if Q is None else Q
+    x, y, z = np.empty((count, n)), np.empty((count, rows)), np.empty((count, n))
+    status, m = np.empty(count, np.int64), np.empty((count, 5))
 
     def work(i: int, j: int) -> None:
-        cone.solve(
-            A_l[i:j], b_l[i:j], c_l[i:j], Q_l[i:j], sizes, starts, offsets, quadratic, TOLERANCE, MOST_STEPS,
-            x[i:j], y[i:j], z[i:j], status[i:j], measures[i:j],
-        )  # fmt: skip
+        each = [v if len(v) == 1 else v[i:j] for v in (A, b, c, Q)]
+        cone.solve(*each, sizes, starts, offsets, TOLERANCE, MOST_STEPS, x[i:j], y[i:j], z[i:j], status[i:j], m[i:j])
 
-    over_ranges(work, blocks, 4)
-    m = _problems(measures, count)
-    code = status.reshape(-1)[:count]
-    gap = np.abs(m[:, 0] - m[:, 1]) / np.maximum(1.0, np.abs(m[:, 0]))
-    residual = np.maximum(np.maximum(m[:, 2], m[:, 3]), np.where(np.isfinite(gap), gap, 0.0))
-    code = np.where((code == cone.INACCURATE) & (residual <= ACCEPTABLE), cone.OPTIMAL, code)
-    return Solutions(
-        _problems(x, count), _problems(y, count), _problems(z, count), code, m[:, 0], m[:, 1], residual, m[:, 4]
-    )
+    over_ranges(work, count, 8)
+    if (status == cone.INACCURATE).any():
+        gap = np.abs(m[:, 0] - m[:, 1]) / np.maximum(1.0, np.abs(m[:, 0]))
+        fine = np.maximum(np.maximum(m[:, 2], m[:, 3]), gap) <= ACCEPTABLE
+        status = np.where((status == cone.INACCURATE) & fine, cone.OPTIMAL, status)
+    return Solutions(x, y, z, status, m[:, 0], m[:, 1], np.maximum(m[:, 2], m[:, 3]), m[:, 4])
+
+
+@cache
+def _layout(cones: tuple[int, ...]) -> tuple[IntArray, IntArray, IntArray]:
+    """Sizes of the cones, where each starts in x, and where its block starts among the blocks."""
+    sizes = np.array(cones, np.int64)
+    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
+    return sizes, starts, np.concatenate([[0], np.cumsum(sizes**2)]).astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False)
