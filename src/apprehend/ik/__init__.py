@@ -2,5 +2,39 @@
 
 from .result import IKResult, IKStatus
 from .solve import solve
+from .step import Stepper, TrackResult, TrackStatus, step, track
+from .tasks import (
+    ComTask,
+    DescentTask,
+    DirectionTask,
+    JointTask,
+    LookAtTask,
+    OrientationTask,
+    PoseTask,
+    PositionTask,
+    PostureTask,
+    RelativeTask,
+    Task,
+)
 
-__all__ = ["IKResult", "IKStatus", "solve"]
+__all__ = [
+    "ComTask",
+    "DescentTask",
+    "DirectionTask",
+    "IKResult",
+    "IKStatus",
+    "JointTask",
+    "LookAtTask",
+    "OrientationTask",
+    "PoseTask",
+    "PositionTask",
+    "PostureTask",
+    "RelativeTask",
+    "Stepper",
+    "Task",
+    "TrackResult",
+    "TrackStatus",
+    "solve",
+    "step",
+    "track",
+]
