@@ -13,6 +13,9 @@ from .differential import (
 from .exponentials import ProductOfExponentials, leaf_to_root_jacobian
 from .hand import Finger, Hand
 from .jaw import ParallelJaw
+from .manipulability import Manipulability, manipulability
+from .pictures import draw
+from .polytopes import Polytope, force_polytope, velocity_polytope
 from .robot import Limits, Robot
 
 __all__ = [
@@ -21,7 +24,9 @@ __all__ = [
     "Finger",
     "Hand",
     "Limits",
+    "Manipulability",
     "ParallelJaw",
+    "Polytope",
     "ProductOfExponentials",
     "Robot",
     "StaticsResult",
@@ -29,10 +34,14 @@ __all__ = [
     "acceleration",
     "dh_table",
     "dh_transform",
+    "draw",
+    "force_polytope",
     "frame_wrench",
     "inverse_dh_transform",
     "joint_torques",
     "leaf_to_root_jacobian",
+    "manipulability",
     "rpy_jacobian",
     "velocity",
+    "velocity_polytope",
 ]
