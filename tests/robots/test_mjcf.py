@@ -229,7 +229,7 @@ BODY = '<worldbody><body name="b"><geom size="1"/></body></worldbody>'
         ("<mujoco><include file='/etc/passwd'/></mujoco>", "outside the allowed folders"),
         (f"<mujoco><asset><mesh file='/etc/x.stl'/></asset>{BODY}</mujoco>", "outside the allowed folders"),
         (
-            f"<mujoco><compiler meshdir='{'../' * 9}etc'/><asset><texture name='h' file='passwd'/></asset>{BODY}</mujoco>",
+            f"<mujoco><compiler meshdir='{'../' * 9}etc'/><asset><texture file='passwd'/></asset>{BODY}</mujoco>",
             "outside the allowed folders",
         ),
     ],
