@@ -43,6 +43,9 @@ ALWAYS = 0.95
 RESOLUTION = 1e-3
 """Default of `CollisionModel.resolution`, in m."""
 
+NONE = np.zeros(0, np.int64)
+NO_BLOCKS = np.zeros(0)
+
 GRAIN = 16
 """Smallest share of a batch that is worth a thread."""
 
@@ -134,7 +137,7 @@ class CollisionModel:
         lower, upper = np.maximum(self.robot.limits.lower, -np.pi), np.minimum(self.robot.limits.upper, np.pi)
         q = rng.uniform(lower, upper, (SAMPLES, self.robot.n))
         hits = np.zeros(len(blocks), np.int64)
-        collide.hits_of_blocks(model, q, self.clearance, 0, SAMPLES, hits)
+        collide.check(model, q, self.clearance, 0, SAMPLES, NONE, hits)
         for (i, j), count in zip(blocks, hits, strict=True):
             if count >= ALWAYS * SAMPLES:
                 reasons[pair(links[i].name, links[j].name)] = "touch in nearly every configuration"
@@ -282,7 +285,7 @@ class CollisionModel:
         out = np.full(len(rows), -1, np.int64)
         model, margin = self.compiled, self.clearance
         if len(rows):
-            over_ranges(lambda a, b: collide.check_many(model, rows, margin, a, b, out), len(rows), GRAIN)
+            over_ranges(lambda a, b: collide.check(model, rows, margin, a, b, out, NONE), len(rows), GRAIN)
         return out.reshape(shape)
 
     def free(self, q: ArrayLike) -> BoolArray:
@@ -311,7 +314,7 @@ class CollisionModel:
         model, margin = self.compiled, self.clearance
 
         def work(start: int, stop: int) -> None:
-            collide.edges_many(model, rows_a, rows_b, margin, step, start, stop, out, where)
+            collide.edges_many(model, rows_a, rows_b, NONE, margin, step, start, stop, out, where)
 
         if len(rows_a):
             over_ranges(work, len(rows_a), 1)
@@ -338,7 +341,11 @@ class CollisionModel:
         if len(model.pairs) == 0:
             raise InputError("there is no pair of things that could collide, so there is no distance")
         if len(rows):
-            over_ranges(lambda a, b: collide.distance_many(model, rows, a, b, distance, number, out), len(rows), GRAIN)
+            over_ranges(
+                lambda a, b: collide.distances(model, rows, math.inf, a, b, distance, number, out, NO_BLOCKS),
+                len(rows),
+                GRAIN,
+            )
         names = tuple(self.names_of(int(p)) for p in number)
         points = out[:, :6].reshape(*shape, 2, 3)
         return Closest(distance.reshape(shape), points, out[:, 6:].reshape(*shape, 3), names)
@@ -349,11 +356,13 @@ class CollisionModel:
         if q.ndim != 1:
             raise InputError(f"q has shape {q.shape}; expected one configuration ({self.robot.n},)")
         model = self.compiled
-        gap, points = np.zeros(len(model.blocks)), np.zeros((len(model.blocks), 9))
-        collide.block_gaps(model, np.array(q), self.clearance + 1e-9, gap, points)
+        gap, row = np.zeros(len(model.blocks)), np.array(q)[None]
+        least, number, points = np.zeros(1), np.zeros(1, np.int64), np.zeros((1, 9))
+        if len(gap):
+            collide.distances(model, row, self.clearance + 1e-9, 0, 1, least, number, points, gap)
         touching = [
             Touch(self.nodes[a].name, self.nodes[b].name, float(d))
-            for (a, b, _, _), d in zip(model.blocks, gap, strict=True)
+            for (a, b), d in zip(model.blocks[:, :2], gap, strict=True)
             if d <= self.clearance
         ]
         return tuple(sorted(touching, key=lambda touch: touch.distance))
@@ -361,7 +370,7 @@ class CollisionModel:
     def names_of(self, number: int) -> tuple[str, str]:
         """The two names of a pair of shapes that `hits` answered."""
         model = self.compiled
-        for a, b, begin, end in model.blocks:
+        for a, b, begin, end in model.blocks[:, :4]:
             if begin <= number < end:
                 return self.nodes[a].name, self.nodes[b].name
         raise InputError(f"there is no pair {number}")

@@ -147,31 +147,27 @@ def compile_model(robot: Robot, nodes: Sequence[Node], blocks: Iterable[tuple[in
     """Arrays for the kernels; *blocks* are pairs of indices into *nodes*, in the order in which they are tested."""
     tree = robot.model
     shapes = [shape for node in nodes for shape in node.shapes]
-    ints, floats, points, first, around, half = pack(shapes)
+    ints, floats, points, graph = pack(shapes)
     start = np.cumsum([0] + [len(node.shapes) for node in nodes])
     for k, node in enumerate(nodes):
         ints[start[k] : start[k + 1], 3] = node.carrier
-    rows: list[tuple[int, int, int, int]] = []
+    m = len(tree.kind)
+    rows: list[list[int]] = []
     pairs: list[tuple[int, int]] = []
-    common: list[list[bool]] = []
     for a, b in blocks:
         begin = len(pairs)
         pairs += [(g, h) for g in range(start[a], start[a + 1]) for h in range(start[b], start[b + 1])]
-        rows.append((a, b, begin, len(pairs)))
         both = set(ancestors(tree, nodes[a].carrier)) & set(ancestors(tree, nodes[b].carrier))
-        common.append([j in both for j in range(len(tree.kind))])
+        rows.append([a, b, begin, len(pairs), *(int(j in both) for j in range(m))])
+    parts = [[*node_ball(node), node.carrier, *reach(tree, robot, node)] for node in nodes]
     return CollideModel(
-        tree,
-        ints,
-        floats,
-        points,
-        first,
-        around,
-        half,
-        np.array([node.carrier for node in nodes], np.int64),
-        np.array([node_ball(node) for node in nodes]).reshape(-1, 4),
-        np.array([reach(tree, robot, node) for node in nodes]).reshape(len(nodes), len(tree.kind)),
-        np.array(common, np.uint8).reshape(len(rows), len(tree.kind)),
-        np.array(rows, np.int64).reshape(-1, 4),
-        np.array(pairs, np.int64).reshape(-1, 2),
+        links=np.stack([tree.parent, tree.kind, tree.coordinate], axis=1),
+        joints=np.concatenate([tree.place, tree.gain], axis=1),
+        ints=ints,
+        floats=floats,
+        points=points,
+        graph=graph,
+        nodes=np.array(parts, np.float64).reshape(len(nodes), 5 + m),
+        blocks=np.array(rows, np.int64).reshape(len(rows), 4 + m),
+        pairs=np.array(pairs, np.int64).reshape(-1, 2),
     )

@@ -41,7 +41,7 @@ def signed_distance(a: Convex, b: Convex, T_a: ArrayLike, T_b: ArrayLike) -> Sep
     for flat, T in zip(poses, (TA, TB), strict=True):
         rows = T.reshape(count, 4, 4)
         flat[:, :9], flat[:, 9:] = rows[:, :3, :3].reshape(count, 9), rows[:, :3, 3]
-    arrays = pack((a, b))[:5]
+    arrays = pack((a, b))
     distance, out = np.zeros(count), np.zeros((count, 9))
     if count:
         over_ranges(

@@ -214,11 +214,10 @@ def shape_convexes(shape: Shape) -> tuple[Convex, ...]:
     return (Convex.capsule(shape.size[0], shape.size[1]).at(shape.pose),)
 
 
-def pack(shapes: Sequence[Convex]) -> tuple[IntArray, Array, Array, IntArray, IntArray, Array]:
-    """Arrays for kernels (layout: `apprehend.kernels.gjk`): ints, floats, points, first, around, half."""
+def pack(shapes: Sequence[Convex]) -> tuple[IntArray, Array, Array, IntArray]:
+    """Arrays for kernels (layout: `apprehend.kernels.gjk`): ints, floats, points, graph."""
     ints = np.zeros((len(shapes), 4), np.int64)
-    floats = np.zeros((len(shapes), 20))
-    half = np.zeros((len(shapes), 3))
+    floats = np.zeros((len(shapes), 23))
     points: list[Array] = [np.zeros((0, 3))]
     first, around = [0], []
     count = 0
@@ -226,18 +225,11 @@ def pack(shapes: Sequence[Convex]) -> tuple[IntArray, Array, Array, IntArray, In
         ints[g] = shape.kind, count, len(shape.points), -1
         centre, reach = shape.ball
         floats[g, :3], floats[g, 3], floats[g, 4:7], floats[g, 7] = shape.size, shape.radius, centre, reach
-        floats[g, 8:17], floats[g, 17:20] = shape.pose[:3, :3].ravel(), shape.pose[:3, 3]
-        half[g] = shape.half
+        floats[g, 8:17], floats[g, 17:20], floats[g, 20:] = shape.pose[:3, :3].ravel(), shape.pose[:3, 3], shape.half
         points.append(shape.points)
         count += len(shape.points)
         for near in shape.neighbours:
             around += near
             first.append(len(around))
-    return (
-        ints,
-        floats,
-        np.concatenate(points),
-        np.array(first, np.int64),
-        np.array(around, np.int64),
-        half,
-    )
+    graph = np.concatenate([np.array(first, np.int64) + len(first), np.array(around, np.int64)])
+    return ints, floats, np.concatenate(points), graph

@@ -2,9 +2,9 @@
 
 Shapes are rows as in `gjk`; the fourth entry of a row of ``ints`` is the tree's joint that carries the shape (−1: the
 world). Shapes belong to *nodes* (links, attached bodies, obstacles); a node has a bounding sphere in its carrier.
-*Blocks* are pairs of nodes that may touch each other, each with a range of pairs of shapes. Three tests follow one
-another: bounding spheres of the nodes, bounding sphere of one shape against the oriented box of the other, and GJK
-that stops as soon as the question is decided.
+*Blocks* are pairs of nodes that may not touch, each with a range of pairs of shapes. Three tests follow one another:
+bounding spheres of the nodes, bounding sphere of one shape against the oriented box of the other, and GJK that stops
+as soon as the question is decided.
 """
 
 from __future__ import annotations
@@ -15,246 +15,260 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .gjk import compose, gjk, relative
-from .gjk_depth import PairSpace, new_pair_space, signed_distance
-from .tree import TreeModel, tree_single
+from .collide_pairs import report
+from .gjk import AXIS, REL, ROWS, compose, gjk, relative
+from .gjk_depth import depth_scratch, signed_distance
 
-WORLD = -1
 QUEUE = 4096
+CENTRE = 12  # columns of a placed shape: pose, centre of the bounding sphere, whether the pose is up to date
+DONE = 15
 
 
 class CollideModel(NamedTuple):
-    """Arrays of one robot in its surroundings."""
+    """Arrays of one robot in its surroundings: m joints, G shapes, K nodes, B blocks, P pairs of shapes."""
 
-    tree: TreeModel
+    links: np.ndarray  # (m, 3) int64: parent joint, kind (0 revolute, 1 prismatic), coordinate
+    joints: np.ndarray  # (m, 14): place in the parent's moved frame (12), multiplier, offset
     ints: np.ndarray  # (G, 4) int64
-    floats: np.ndarray  # (G, 20)
+    floats: np.ndarray  # (G, 23)
     points: np.ndarray  # (V, 3)
-    first: np.ndarray  # (V + 1,) int64
-    around: np.ndarray  # (E,) int64
-    half: np.ndarray  # (G, 3): half extents of the box around a shape, in the shape's frame
-    carrier: np.ndarray  # (K,) int64: joint that carries a node, −1: the world
-    balls: np.ndarray  # (K, 4): bounding sphere of a node in its carrier
-    reach: np.ndarray  # (K, m): how far a point of the node moves at most per unit of the joint's value
-    common: (
-        np.ndarray
-    )  # (B, m) uint8: whether a joint carries both nodes of a block (then it moves neither against the other)
-    blocks: np.ndarray  # (B, 4) int64: node, node, first pair, end of pairs
+    graph: np.ndarray  # int64
+    nodes: np.ndarray  # (K, 5 + m): bounding sphere in the carrier (4), carrier, farthest motion per unit of each joint
+    blocks: np.ndarray  # (B, 4 + m) int64: node, node, first pair, end of pairs, whether a joint carries both
     pairs: np.ndarray  # (P, 2) int64: shapes
 
 
 class CollideSpace(NamedTuple):
     """Scratch of one thread."""
 
-    poses: np.ndarray  # (m, 12)
-    shapes: np.ndarray  # (G, 12), in the world
-    centres: np.ndarray  # (G, 3), of the shapes' bounding spheres, in the world
-    balls: np.ndarray  # (K, 3), centres of the nodes' bounding spheres, in the world
-    axes: np.ndarray  # (P, 3), last separating direction of every pair
-    hints: np.ndarray  # (P, 2) int64
-    q: np.ndarray  # (n,)
-    rate: np.ndarray  # (B,)
-    queue: np.ndarray  # (QUEUE, 2)
-    pair: PairSpace
+    poses: np.ndarray  # (m, 12) moved frames
+    shapes: np.ndarray  # (G, 16)
+    balls: np.ndarray  # (K, 3), centres of the nodes' bounding spheres in the world
+    memory: np.ndarray  # (P, 5): last separating direction of every pair, last vertices
+    ws: np.ndarray  # (16, 12), see `gjk`
 
 
 @kernel
-def make_space(model, n):
-    """Fresh scratch for *model* with *n* coordinates."""
-    G, K, P = model.ints.shape[0], model.carrier.shape[0], model.pairs.shape[0]
-    pair = new_pair_space()
-    return CollideSpace(
-        np.zeros((model.tree.kind.shape[0], 12)),
-        np.zeros((G, 12)),
-        np.zeros((G, 3)),
-        np.zeros((K, 3)),
-        np.zeros((P, 3)),
-        np.zeros((P, 2), np.int64),
-        np.zeros(n),
-        np.zeros(model.blocks.shape[0]),
-        np.empty((QUEUE, 2)),
-        pair,
-    )
+def make_space(model):
+    """Fresh scratch for *model*, with everything that stands still in place."""
+    ints, floats, nodes = model.ints, model.floats, model.nodes
+    shapes, balls = np.zeros((ints.shape[0], 16)), np.zeros((nodes.shape[0], 3))
+    for k in range(nodes.shape[0]):
+        for i in range(3):
+            balls[k, i] = nodes[k, i]
+    for g in range(ints.shape[0]):
+        for i in range(12):
+            shapes[g, i] = floats[g, 8 + i]
+        for i in range(3):
+            shapes[g, CENTRE + i] = floats[g, 4 + i]
+        shapes[g, DONE] = 1.0
+    poses = np.zeros((model.links.shape[0], 12))
+    return CollideSpace(poses, shapes, balls, np.zeros((model.pairs.shape[0], 5)), np.zeros((ROWS, 12)))
 
 
 @kernel
-def place_point(T, x, y, z, out):
-    """``out = T (x, y, z)`` for a pose (12,)."""
-    for k in range(3):
-        out[k] = T[3 * k] * x + T[3 * k + 1] * y + T[3 * k + 2] * z + T[9 + k]
+def move_joints(links, joints, q, poses):
+    """Moved frames of all joints at ``q (n,)``."""
+    for i in range(links.shape[0]):
+        T = poses[i]
+        if links[i, 0] < 0:
+            for k in range(12):
+                T[k] = joints[i, k]
+        else:
+            compose(poses[links[i, 0]], joints[i], T)
+        value = joints[i, 12] * q[links[i, 2]] + joints[i, 13]
+        if links[i, 1] == 0:
+            s, c = math.sin(value), math.cos(value)
+            for k in range(3):
+                b0, b1 = T[3 * k], T[3 * k + 1]
+                T[3 * k] = b0 * c + b1 * s
+                T[3 * k + 1] = b1 * c - b0 * s
+        else:
+            for k in range(3):
+                T[9 + k] += value * T[3 * k + 2]
 
 
 @kernel
-def place(model, q, space, everything):
-    """Put the tree at *q*: poses of joints, bounding spheres, shapes; fixed shapes only when *everything*."""
-    tree_single(model.tree, q, space.poses)
-    for k in range(model.carrier.shape[0]):
-        c = model.carrier[k]
-        if c >= 0:
-            place_point(space.poses[c], model.balls[k, 0], model.balls[k, 1], model.balls[k, 2], space.balls[k])
-        elif everything:
+def place(model, q, space):
+    """Put the tree at *q*: poses of joints, bounding spheres of nodes and shapes; poses of shapes follow on demand."""
+    ints, floats, nodes = model.ints, model.floats, model.nodes
+    poses, shapes, balls = space.poses, space.shapes, space.balls
+    move_joints(model.links, model.joints, q, poses)
+    for k in range(nodes.shape[0]):
+        carrier = int(nodes[k, 4])
+        if carrier >= 0:
+            T = poses[carrier]
             for i in range(3):
-                space.balls[k, i] = model.balls[k, i]
-    for g in range(model.ints.shape[0]):
-        c = model.ints[g, 3]
-        f = model.floats[g]
-        if c >= 0:
-            place_point(space.poses[c], f[4], f[5], f[6], space.centres[g])
-            space.shapes[g, 0] = 2.0  # not composed yet: no rotation has such an entry
-        elif everything:
+                balls[k, i] = (
+                    T[3 * i] * nodes[k, 0] + T[3 * i + 1] * nodes[k, 1] + T[3 * i + 2] * nodes[k, 2] + T[9 + i]
+                )
+    for g in range(ints.shape[0]):
+        if ints[g, 3] >= 0:
+            T = poses[ints[g, 3]]
+            x, y, z = floats[g, 4], floats[g, 5], floats[g, 6]
             for i in range(3):
-                space.centres[g, i] = f[4 + i]
-            for i in range(12):
-                space.shapes[g, i] = f[8 + i]
+                shapes[g, CENTRE + i] = T[3 * i] * x + T[3 * i + 1] * y + T[3 * i + 2] * z + T[9 + i]
+            shapes[g, DONE] = 0.0
 
 
 @kernel
-def shape_pose(model, g, space):
+def finish(ints, floats, poses, shapes, g):
     """World pose of shape *g*, composed on demand."""
-    if space.shapes[g, 0] == 2.0:
-        compose(space.poses[model.ints[g, 3]], model.floats[g, 8:20], space.shapes[g])
+    if shapes[g, DONE] == 0.0:
+        compose(poses[ints[g, 3]], floats[g, 8:20], shapes[g])
+        shapes[g, DONE] = 1.0
 
 
 @kernel
-def ball_to_box(model, a, b, space):
-    """Distance between the bounding sphere of shape *a* and the oriented box of shape *b*; a lower bound for the pair."""
-    T = space.shapes[b]
-    x, y, z = space.centres[a, 0] - T[9], space.centres[a, 1] - T[10], space.centres[a, 2] - T[11]
-    dx = max(abs(T[0] * x + T[3] * y + T[6] * z) - model.half[b, 0], 0.0)
-    dy = max(abs(T[1] * x + T[4] * y + T[7] * z) - model.half[b, 1], 0.0)
-    dz = max(abs(T[2] * x + T[5] * y + T[8] * z) - model.half[b, 2], 0.0)
-    return math.sqrt(dx * dx + dy * dy + dz * dz) - model.floats[a, 7]
+def ball_to_box(floats, shapes, a, b):
+    """Distance between the bounding sphere of shape *a* and the oriented box of shape *b*: a lower bound."""
+    T, C = shapes[b], shapes[a]
+    x, y, z = C[CENTRE] - T[9], C[CENTRE + 1] - T[10], C[CENTRE + 2] - T[11]
+    dx = max(abs(T[0] * x + T[3] * y + T[6] * z) - floats[b, 20], 0.0)
+    dy = max(abs(T[1] * x + T[4] * y + T[7] * z) - floats[b, 21], 0.0)
+    dz = max(abs(T[2] * x + T[5] * y + T[8] * z) - floats[b, 22], 0.0)
+    return math.sqrt(dx * dx + dy * dy + dz * dz) - floats[a, 7]
 
 
 @kernel
-def ball_to_ball(model, a, b, space):
+def ball_to_ball(floats, shapes, a, b):
     """Distance between the bounding spheres of two shapes."""
-    x = space.centres[a, 0] - space.centres[b, 0]
-    y = space.centres[a, 1] - space.centres[b, 1]
-    z = space.centres[a, 2] - space.centres[b, 2]
-    return math.sqrt(x * x + y * y + z * z) - model.floats[a, 7] - model.floats[b, 7]
+    x = shapes[a, CENTRE] - shapes[b, CENTRE]
+    y = shapes[a, CENTRE + 1] - shapes[b, CENTRE + 1]
+    z = shapes[a, CENTRE + 2] - shapes[b, CENTRE + 2]
+    return math.sqrt(x * x + y * y + z * z) - floats[a, 7] - floats[b, 7]
 
 
 @kernel
-def node_gap(model, block, space):
-    """Distance between the bounding spheres of the nodes of a block."""
-    a, b = model.blocks[block, 0], model.blocks[block, 1]
-    x = space.balls[a, 0] - space.balls[b, 0]
-    y = space.balls[a, 1] - space.balls[b, 1]
-    z = space.balls[a, 2] - space.balls[b, 2]
-    return math.sqrt(x * x + y * y + z * z) - model.balls[a, 3] - model.balls[b, 3]
+def node_gap(nodes, balls, a, b):
+    """Distance between the bounding spheres of two nodes."""
+    x, y, z = balls[a, 0] - balls[b, 0], balls[a, 1] - balls[b, 1], balls[a, 2] - balls[b, 2]
+    return math.sqrt(x * x + y * y + z * z) - nodes[a, 3] - nodes[b, 3]
 
 
 @kernel
-def pair_gap(model, p, space, above, below, gap):
-    """Bounds on the distance of pair *p*: decided against *above* and *below*, or within a relative *gap*.
+def pair_gap(ints, floats, points, graph, a, b, poses, shapes, memory, ws, above, below, gap):
+    """Bounds on the distance of shapes *a* and *b*: decided against *above* and *below*, or within a relative *gap*.
 
-    The upper bound is meaningless when the lower one exceeds *above*. Overlap is 0, 0.
+    The upper bound is meaningless when the lower one exceeds *above*. Overlapping cores count as touching.
     """
-    a, b = model.pairs[p, 0], model.pairs[p, 1]
-    low = ball_to_ball(model, a, b, space)
+    low = ball_to_ball(floats, shapes, a, b)
     if low > above:
         return low, low
-    shape_pose(model, b, space)
-    low = ball_to_box(model, a, b, space)
+    finish(ints, floats, poses, shapes, b)
+    low = ball_to_box(floats, shapes, a, b)
     if low > above:
         return low, low
-    shape_pose(model, a, space)
-    low = ball_to_box(model, b, a, space)
+    finish(ints, floats, poses, shapes, a)
+    low = ball_to_box(floats, shapes, b, a)
     if low > above:
         return low, low
-    grown = model.floats[a, 3] + model.floats[b, 3]
-    s = space.pair
-    relative(space.shapes[a], space.shapes[b], s.rel)
-    _, lower, upper = gjk(
-        model.ints, model.floats, model.points, model.first, model.around, a, b, s.rel,
-        s.simplex, s.bary, space.axes[p], space.hints[p], above + grown, below + grown, gap,
-    )  # fmt: skip
+    grown = floats[a, 3] + floats[b, 3]
+    relative(shapes[a], shapes[b], ws[REL])
+    for c in range(5):
+        ws[AXIS, c] = memory[c]
+    _, lower, upper = gjk(ints, floats, points, graph, a, b, ws, above + grown, below + grown, gap)
+    for c in range(5):
+        memory[c] = ws[AXIS, c]
     return lower - grown, upper - grown
 
 
 @kernel
-def first_hit(model, space, margin):
-    """The first pair of shapes nearer than or at *margin* in the placed model, or −1."""
-    for block in range(model.blocks.shape[0]):
-        if node_gap(model, block, space) > margin:
-            continue
-        for p in range(model.blocks[block, 2], model.blocks[block, 3]):
-            lower, upper = pair_gap(model, p, space, margin, margin, 1e-12)
-            if not lower > margin and upper <= margin:
-                return p
+def block_hit(model, space, block, margin):
+    """The first pair of shapes of a block that is nearer than or at *margin*, or −1."""
+    ints, floats, points, graph, pairs = model.ints, model.floats, model.points, model.graph, model.pairs
+    poses, shapes, memory, ws = space.poses, space.shapes, space.memory, space.ws
+    for p in range(model.blocks[block, 2], model.blocks[block, 3]):
+        a, b = pairs[p, 0], pairs[p, 1]
+        lower, upper = pair_gap(ints, floats, points, graph, a, b, poses, shapes, memory[p], ws, margin, margin, 1e-12)
+        if not lower > margin and upper <= margin:
+            return p
     return -1
 
 
 @kernel
-def check_many(model, q, margin, start, stop, out):
-    """``out[i]`` = colliding pair of ``q[i]`` or −1."""
-    space = make_space(model, q.shape[1])
-    place(model, q[start], space, True)
+def check(model, q, margin, start, stop, out, hits):
+    """``out[i]`` = colliding pair of ``q[i]`` or −1; with ``hits (B,)``, count instead how often each block touches."""
+    space = make_space(model)
+    blocks, nodes, balls = model.blocks, model.nodes, space.balls
+    counting = hits.shape[0] > 0
     for i in range(start, stop):
-        place(model, q[i], space, False)
-        out[i] = first_hit(model, space, margin)
+        place(model, q[i], space)
+        found = -1
+        for block in range(blocks.shape[0]):
+            if node_gap(nodes, balls, blocks[block, 0], blocks[block, 1]) <= margin:
+                found = block_hit(model, space, block, margin)
+                if found >= 0:
+                    if not counting:
+                        break
+                    hits[block] += 1
+        if not counting:
+            out[i] = found
 
 
 @kernel
-def block_rates(model, qa, qb, space):
+def block_rates(model, qa, qb, rate):
     """How fast the nodes of every block can approach each other along ``qa → qb``, per unit of the whole motion."""
-    tree = model.tree
-    m = tree.kind.shape[0]
-    moved = 0.0
+    links, joints, nodes, blocks = model.links, model.joints, model.nodes, model.blocks
+    m = links.shape[0]
+    moved = np.empty(m)
     for i in range(m):
-        moved = max(moved, abs(qb[tree.coordinate[i]] - qa[tree.coordinate[i]]))
-    for block in range(model.blocks.shape[0]):
-        a, b = model.blocks[block, 0], model.blocks[block, 1]
-        rate = 0.0
+        moved[i] = abs(joints[i, 12] * (qb[links[i, 2]] - qa[links[i, 2]]))
+    for block in range(blocks.shape[0]):
+        a, b = blocks[block, 0], blocks[block, 1]
+        total = 0.0
         for i in range(m):
-            if model.common[block, i] == 0:
-                c = tree.coordinate[i]
-                rate += abs(tree.gain[i, 0] * (qb[c] - qa[c])) * (model.reach[a, i] + model.reach[b, i])
-        space.rate[block] = rate
+            if blocks[block, 4 + i] == 0:
+                total += moved[i] * (nodes[a, 5 + i] + nodes[b, 5 + i])
+        rate[block] = total
 
 
 @kernel
-def covered(model, space, margin, resolution, wanted):
+def covered(model, space, rate, margin, resolution, wanted):
     """Part of a motion around the placed configuration that is certainly free, at most *wanted*; negative: a hit.
 
     A hit is answered as −1 − pair.
     """
+    ints, floats, points, graph, pairs = model.ints, model.floats, model.points, model.graph, model.pairs
+    poses, shapes, memory, ws = space.poses, space.shapes, space.memory, space.ws
+    blocks, nodes, balls = model.blocks, model.nodes, space.balls
     radius = wanted
-    for block in range(model.blocks.shape[0]):
-        rate = space.rate[block]
-        if rate == 0.0 and wanted < 1.0:
+    for block in range(blocks.shape[0]):
+        speed = rate[block]
+        if speed == 0.0 and wanted < 1.0:
             continue  # nothing moves here: settled by the first configuration
-        need = margin + radius * rate
-        if node_gap(model, block, space) > need:
+        need = margin + radius * speed
+        if node_gap(nodes, balls, blocks[block, 0], blocks[block, 1]) > need:
             continue
-        for p in range(model.blocks[block, 2], model.blocks[block, 3]):
-            lower, upper = pair_gap(model, p, space, need, margin, 0.2)
+        for p in range(blocks[block, 2], blocks[block, 3]):
+            a, b = pairs[p, 0], pairs[p, 1]
+            lower, upper = pair_gap(ints, floats, points, graph, a, b, poses, shapes, memory[p], ws, need, margin, 0.2)
             if lower > need:
                 continue
             if upper <= margin:
                 return -1.0 - p
-            if rate > 0.0:
-                radius = min(radius, max(lower - margin, resolution) / rate)
-                need = margin + radius * rate
+            if speed > 0.0:
+                radius = min(radius, max(lower - margin, resolution) / speed)
+                need = margin + radius * speed
     return radius
 
 
 @kernel
-def edge_hit(model, qa, qb, margin, resolution, space):
-    """Whether the straight motion ``qa → qb`` is free: −1, or the pair that is hit and where.
+def edge_hit(model, qa, qb, margin, resolution, space, rate, queue):
+    """Whether the straight motion ``qa → qb`` is free: −1, or the pair that is hit and where: ``(pair, s)``.
 
     Configurations are checked from the middle outwards; each covers the part of the motion around it in which no pair
-    can lose more than its distance to *margin*, or *resolution* if that is more. Returns ``(pair, s)``.
+    can lose more than its distance to *margin*, or *resolution* if that is more.
     """
     n = qa.shape[0]
-    block_rates(model, qa, qb, space)
-    q = space.q
+    block_rates(model, qa, qb, rate)
+    q = queue[QUEUE, :n]
+    low, high = 0.0, 1.0
     for end in range(2):  # the ends first: they also settle what does not move at all
         for j in range(n):
             q[j] = qa[j] if end == 0 else qb[j]
-        place(model, q, space, end == 0)
-        radius = covered(model, space, margin, resolution, 1.0)
+        place(model, q, space)
+        radius = covered(model, space, rate, margin, resolution, 1.0)
         if radius < 0.0:
             return int(-1.0 - radius), float(end)
         if radius >= 1.0:
@@ -263,7 +277,6 @@ def edge_hit(model, qa, qb, margin, resolution, space):
             low = radius
         else:
             high = 1.0 - radius
-    queue = space.queue
     head, count = 0, 0
     if low < high:
         queue[0, 0], queue[0, 1] = low, high
@@ -279,8 +292,8 @@ def edge_hit(model, qa, qb, margin, resolution, space):
         middle = 0.5 * (low + high)
         for j in range(n):
             q[j] = qa[j] + middle * (qb[j] - qa[j])
-        place(model, q, space, False)
-        radius = covered(model, space, margin, resolution, 0.5 * (high - low) + 1e-12)
+        place(model, q, space)
+        radius = covered(model, space, rate, margin, resolution, 0.5 * (high - low) + 1e-12)
         if radius < 0.0:
             return int(-1.0 - radius), middle
         if middle - radius > low:
@@ -295,101 +308,77 @@ def edge_hit(model, qa, qb, margin, resolution, space):
 
 
 @kernel
-def edges_many(model, qa, qb, margin, resolution, start, stop, out, where):
-    """``out[i]`` = pair hit on the straight motion ``qa[i] → qb[i]``, at ``where[i]`` in 0 … 1; −1: free."""
-    space = make_space(model, qa.shape[1])
-    place(model, qa[start], space, True)
-    for i in range(start, stop):
-        out[i], where[i] = edge_hit(model, qa[i], qb[i], margin, resolution, space)
+def edge_scratch(model, n):
+    """Scratch ``rate`` and ``queue`` of `edge_hit` (the last row of the queue holds a configuration)."""
+    return np.empty(model.blocks.shape[0]), np.empty((QUEUE + 1, max(n, 2)))
 
 
 @kernel
-def measure(model, p, space, out, best, within):
+def edges_many(model, qa, qb, order, margin, resolution, start, stop, out, where):
+    """``out[i]`` = pair hit on the straight motion ``qa[i] → qb[i]``, at ``where[i]`` in 0 … 1; −1: free.
+
+    With *order*, stop at the first free motion in that order.
+    """
+    space = make_space(model)
+    rate, queue = edge_scratch(model, qa.shape[1])
+    for k in range(start, stop):
+        i = order[k] if order.shape[0] else k
+        out[i], where[i] = edge_hit(model, qa[i], qb[i], margin, resolution, space, rate, queue)
+        if order.shape[0] and out[i] < 0:
+            return
+
+
+@kernel
+def measure(model, p, space, big, out, best, within):
     """Signed distance of pair *p* and whether ``out (9,)`` was written: only when it is below *best* and *within*.
 
     ``out``: the witness points on both shapes and the unit normal from the second to the first, in the world.
     """
+    ints, floats, points, graph = model.ints, model.floats, model.points, model.graph
+    poses, shapes, ws = space.poses, space.shapes, space.ws
+    a, b = model.pairs[p, 0], model.pairs[p, 1]
     enough = max(min(best, within), 0.0)
-    lower, _ = pair_gap(model, p, space, enough, -1.0, 1e-3)
+    lower, _ = pair_gap(ints, floats, points, graph, a, b, poses, shapes, space.memory[p], ws, enough, -1.0, 1e-3)
     if lower > enough:
         return lower, False
-    a, b = model.pairs[p, 0], model.pairs[p, 1]
-    shape_pose(model, a, space)
-    shape_pose(model, b, space)
-    s = space.pair
-    relative(space.shapes[a], space.shapes[b], s.rel)
-    for c in range(3):
-        s.axis[c] = space.axes[p, c]
-    s.hints[0], s.hints[1] = 0, 0
-    d = signed_distance(model.ints, model.floats, model.points, model.first, model.around, a, b, s.rel, s)
+    finish(ints, floats, poses, shapes, a)
+    finish(ints, floats, poses, shapes, b)
+    relative(shapes[a], shapes[b], ws[REL])
+    ws[AXIS, 3], ws[AXIS, 4] = 0.0, 0.0
+    d = signed_distance(ints, floats, points, graph, a, b, ws, big)
     if d >= best:
         return d, False
-    T = space.shapes[a]
-    for k in range(2):
-        for c in range(3):
-            out[3 * k + c] = (
-                T[3 * c] * s.near[k, 0] + T[3 * c + 1] * s.near[k, 1] + T[3 * c + 2] * s.near[k, 2] + T[9 + c]
-            )
-    for c in range(3):
-        out[6 + c] = T[3 * c] * s.axis[0] + T[3 * c + 1] * s.axis[1] + T[3 * c + 2] * s.axis[2]
+    report(shapes[a], ws, out)
     return d, True
 
 
 @kernel
-def nearest(model, space, out):
-    """Smallest signed distance over all pairs of the placed model, its pair, and ``out (9,)`` as in `measure`."""
-    best, pair = 1e300, -1
-    for block in range(model.blocks.shape[0]):
-        if node_gap(model, block, space) >= best:
-            continue
-        for p in range(model.blocks[block, 2], model.blocks[block, 3]):
-            d, written = measure(model, p, space, out, best, 1e300)
-            if written:
-                best, pair = d, p
-    return best, pair
+def distances(model, q, within, start, stop, distance, pair, out, of_blocks):
+    """Smallest signed distance over all pairs for every row of ``q``, its pair, and ``out (N, 9)`` as in `measure`.
 
-
-@kernel
-def distance_many(model, q, start, stop, distance, pair, out):
-    """`nearest` for every row of ``q``."""
-    space = make_space(model, q.shape[1])
-    place(model, q[start], space, True)
-    for i in range(start, stop):
-        place(model, q[i], space, False)
-        distance[i], pair[i] = nearest(model, space, out[i])
-
-
-@kernel
-def hits_of_blocks(model, q, margin, start, stop, hits):
-    """For every block, the number of rows of ``q`` in which its nodes touch: ``hits (B,)`` is added to."""
-    space = make_space(model, q.shape[1])
-    place(model, q[start], space, True)
-    for i in range(start, stop):
-        place(model, q[i], space, False)
-        for block in range(model.blocks.shape[0]):
-            if node_gap(model, block, space) > margin:
-                continue
-            for p in range(model.blocks[block, 2], model.blocks[block, 3]):
-                lower, upper = pair_gap(model, p, space, margin, margin, 1e-12)
-                if not lower > margin and upper <= margin:
-                    hits[block] += 1
-                    break
-
-
-@kernel
-def block_gaps(model, q, within, distance, out):
-    """Signed distance of every block at one ``q (n,)``: ``distance (B,)``, ``out (B, 9)`` as in `nearest`.
-
-    Blocks farther apart than *within* get a lower bound above it, and no points.
+    With ``of_blocks (B,)`` also the smallest of every block, for the last row; blocks farther apart than *within* get
+    a lower bound above it.
     """
-    space = make_space(model, q.shape[0])
-    place(model, q, space, True)
-    for block in range(model.blocks.shape[0]):
-        distance[block] = node_gap(model, block, space)
-        if distance[block] > within:
-            continue
-        best = 1e300
-        for p in range(model.blocks[block, 2], model.blocks[block, 3]):
-            d, _ = measure(model, p, space, out[block], best, within)
-            best = min(best, d)
-        distance[block] = best
+    space, big = make_space(model), depth_scratch()
+    blocks, nodes, balls = model.blocks, model.nodes, space.balls
+    each = of_blocks.shape[0] > 0
+    for i in range(start, stop):
+        place(model, q[i], space)
+        best, found = 1e300, -1
+        for block in range(blocks.shape[0]):
+            gap = node_gap(nodes, balls, blocks[block, 0], blocks[block, 1])
+            if gap >= best and not each:
+                continue
+            least = gap if each and gap > within else 1e300
+            if least == 1e300:
+                limit = 1e300 if each else best
+                for p in range(blocks[block, 2], blocks[block, 3]):
+                    d, written = measure(model, p, space, big, out[i], limit, within)
+                    least = min(least, d)
+                    if written:
+                        limit = d
+                        if d < best:
+                            best, found = d, p
+            if each:
+                of_blocks[block] = least
+        distance[i], pair[i] = best, found

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ._jit import kernel
-from .collide import edge_hit, make_space, place
+from .collide import edge_hit, edge_scratch, make_space
 
 CONNECTED = 1
 FULL = 2
@@ -34,7 +34,7 @@ def nearest_node(nodes, count, q):
 
 
 @kernel
-def extend(model, nodes, parent, count, q, stride, margin, resolution, space, greedy):
+def extend(model, nodes, parent, count, q, stride, margin, resolution, space, rate, queue, greedy):
     """Grow a tree towards *q* by steps of at most *stride*: one, or (*greedy*) as many as are free.
 
     Returns ``(new count, reached)``.
@@ -50,7 +50,7 @@ def extend(model, nodes, parent, count, q, stride, margin, resolution, space, gr
         share = min(1.0, stride / left)
         for j in range(n):
             nodes[count, j] = q[j] if share == 1.0 else nodes[row, j] + share * (q[j] - nodes[row, j])
-        hit, _ = edge_hit(model, nodes[row], nodes[count], margin, resolution, space)
+        hit, _ = edge_hit(model, nodes[row], nodes[count], margin, resolution, space, rate, queue)
         if hit >= 0:
             return count, False
         parent[count] = row
@@ -70,47 +70,57 @@ def grow(model, nodes_a, parent_a, nodes_b, parent_b, count, samples, turn, stri
 
     Returns ``(status, samples used)``; when connected, the last node of each tree is the same configuration.
     """
-    space = make_space(model, samples.shape[1])
-    place(model, samples[0], space, True)
+    space = make_space(model)
+    rate, queue = edge_scratch(model, samples.shape[1])
     for s in range(samples.shape[0]):
         first = (turn + s) % 2 == 0
         before = count[0] if first else count[1]
         if first:
             count[0], _ = extend(
-                model, nodes_a, parent_a, count[0], samples[s], stride, margin, resolution, space, False
+                model, nodes_a, parent_a, count[0], samples[s], stride, margin, resolution, space, rate, queue, False
             )
             after = count[0]
         else:
             count[1], _ = extend(
-                model, nodes_b, parent_b, count[1], samples[s], stride, margin, resolution, space, False
+                model, nodes_b, parent_b, count[1], samples[s], stride, margin, resolution, space, rate, queue, False
             )
             after = count[1]
         if after > before:
             if first:
                 count[1], reached = extend(
-                    model, nodes_b, parent_b, count[1], nodes_a[after - 1], stride, margin, resolution, space, True
+                    model,
+                    nodes_b,
+                    parent_b,
+                    count[1],
+                    nodes_a[after - 1],
+                    stride,
+                    margin,
+                    resolution,
+                    space,
+                    rate,
+                    queue,
+                    True,
                 )
             else:
                 count[0], reached = extend(
-                    model, nodes_a, parent_a, count[0], nodes_b[after - 1], stride, margin, resolution, space, True
+                    model,
+                    nodes_a,
+                    parent_a,
+                    count[0],
+                    nodes_b[after - 1],
+                    stride,
+                    margin,
+                    resolution,
+                    space,
+                    rate,
+                    queue,
+                    True,
                 )
             if reached:
                 return CONNECTED, s + 1
         if count[0] >= nodes_a.shape[0] or count[1] >= nodes_b.shape[0]:
             return FULL, s + 1
     return MORE, samples.shape[0]
-
-
-@kernel
-def first_direct(model, start, goals, order, margin, resolution):
-    """The first goal in *order* that a straight motion from *start* reaches, or −1."""
-    space = make_space(model, start.shape[0])
-    place(model, start, space, True)
-    for g in order:
-        hit, _ = edge_hit(model, start, goals[g], margin, resolution, space)
-        if hit < 0:
-            return g
-    return -1
 
 
 @kernel
@@ -141,14 +151,14 @@ def point_at(path, count, s, out):
 
 
 @kernel
-def skip_vertices(model, path, count, margin, resolution, space):
+def skip_vertices(model, path, count, margin, resolution, space, rate, queue):
     """Drop vertices that a straight motion can pass by, the farthest leaps first; returns the new count."""
     n = path.shape[1]
     i = 0
     while i < count - 2:
         k = count - 1
         while k > i + 1:
-            hit, _ = edge_hit(model, path[i], path[k], margin, resolution, space)
+            hit, _ = edge_hit(model, path[i], path[k], margin, resolution, space, rate, queue)
             if hit < 0:
                 break
             k -= 1
@@ -170,9 +180,9 @@ def shortcut(model, path, count, samples, margin, resolution):
     lies between where they are free and shorter (Geraerts & Overmars 2007). Returns the new count.
     """
     n = path.shape[1]
-    space = make_space(model, n)
-    place(model, path[0], space, True)
-    count = skip_vertices(model, path, count, margin, resolution, space)
+    space = make_space(model)
+    rate, queue = edge_scratch(model, n)
+    count = skip_vertices(model, path, count, margin, resolution, space, rate, queue)
     a, b = np.empty(n), np.empty(n)
     rest = np.empty_like(path)
     for s in range(samples.shape[0]):
@@ -190,7 +200,7 @@ def shortcut(model, path, count, samples, margin, resolution):
             d += (b[j] - a[j]) ** 2
         if math.sqrt(d) > (high - low) * (1.0 - 1e-3):
             continue
-        hit, _ = edge_hit(model, a, b, margin, resolution, space)
+        hit, _ = edge_hit(model, a, b, margin, resolution, space, rate, queue)
         if hit >= 0:
             continue
         # vertices 0 … i, a, b, k + 1 … end
@@ -205,4 +215,4 @@ def shortcut(model, path, count, samples, margin, resolution):
             for j in range(n):
                 path[i + 3 + r, j] = rest[r, j]
         count = i + 3 + tail
-    return skip_vertices(model, path, count, margin, resolution, space)
+    return skip_vertices(model, path, count, margin, resolution, space, rate, queue)

@@ -7,17 +7,17 @@ model are rows of
 
 =========== ===========  ========================================================================================
 ``ints``    (G, 4)       kind, first vertex, number of vertices, free for the caller
-``floats``  (G, 20)      0:3 half extents (box), radius and half length (cylinder, cone: tip at
-                         +half length), or radii (ellipsoid); 3 growing radius; 4:7 and 7
-                         centre and radius of a bounding sphere, in the frame of the carrier; 8:20 pose of the shape
-                         in the frame of its carrier (rotation row-major, translation)
+``floats``  (G, 23)      0:3 half extents (box), radius and half length (cylinder, cone: tip at +half length), or
+                         radii (ellipsoid); 3 growing radius; 4:7 and 7 centre and radius of a bounding sphere, in
+                         the frame of the carrier; 8:20 pose of the shape in the frame of its carrier (rotation
+                         row-major, translation); 20:23 half extents of the box around the shape, in its own frame
 ``points``  (V, 3)       vertices of all hulls, in the frames of their shapes
-``first``   (V + 1,)     start of each vertex' neighbours in ``around``
-``around``  (E,)         neighbours on the hull, counted within the shape
+``graph``   (V+1+E,)     entries k and k + 1 bound the part of ``graph`` that holds the neighbours of vertex k on its
+                         hull, counted within the shape
 =========== ===========  ========================================================================================
 
-Everything happens in the frame of the first shape; ``rel`` (12,) is the pose of the second shape in it. The
-simplex lives in the first rows of ``ws`` (9, 9) with weights ``bary`` (8,): a row holds w = a − b, a and b.
+Everything happens in the frame of the first shape. The scratch ``ws`` (16, 12) holds the simplex in its first nine
+rows (w = a − b, a, b; the last four are the step before) and the rows named below.
 """
 
 from __future__ import annotations
@@ -32,6 +32,14 @@ CYLINDER = 2
 CONE = 3
 ELLIPSOID = 4
 
+BARY = 9  # weights of the simplex' rows; 4:8 of the step before
+AXIS = 10  # 0:3 direction, 3 and 4 the last vertices found on a and on b
+REL = 11  # pose of the second shape in the first
+NEAR = 12  # nearest points, 0:3 on the first and 3:6 on the second
+PLACE_A = 13  # poses in the world
+PLACE_B = 14
+ROWS = 16
+
 CLIMB_FROM = 24
 """Hulls with more vertices than this are climbed from neighbour to neighbour instead of searched."""
 
@@ -40,7 +48,7 @@ TINY = 1e-14
 
 
 @kernel(fast=False)
-def support(ints, floats, points, first, around, g, dx, dy, dz, hint):
+def support(ints, floats, points, graph, g, dx, dy, dz, hint):
     """The point of the core of shape *g* that is farthest along (dx, dy, dz), and its vertex for the next hint."""
     kind = ints[g, 0]
     if kind == BOX:
@@ -76,15 +84,15 @@ def support(ints, floats, points, first, around, g, dx, dy, dz, hint):
                 value = v
                 best = i
     else:
-        best = hint if hint < count else 0
+        best = int(hint) if hint < count else 0
         k = start + best
         value = points[k, 0] * dx + points[k, 1] * dy + points[k, 2] * dz
         moved = True
         while moved:
             moved = False
             k = start + best
-            for e in range(first[k], first[k + 1]):
-                i = around[e]
+            for e in range(graph[k], graph[k + 1]):
+                i = graph[e]
                 v = points[start + i, 0] * dx + points[start + i, 1] * dy + points[start + i, 2] * dz
                 if v > value:
                     value = v
@@ -115,13 +123,16 @@ def compose(A, B, out):
 
 
 @kernel(fast=False)
-def difference(ints, floats, points, first, around, a, b, rel, dx, dy, dz, row, hints):
+def difference(ints, floats, points, graph, a, b, dx, dy, dz, s, row):
     """Support of A − B along d, into ``row`` (w, a, b): a farthest along d, b farthest along −d."""
-    ax, ay, az, hints[0] = support(ints, floats, points, first, around, a, dx, dy, dz, hints[0])
+    rel = s[REL]
+    ax, ay, az, vertex = support(ints, floats, points, graph, a, dx, dy, dz, s[AXIS, 3])
+    s[AXIS, 3] = vertex
     ex = -(rel[0] * dx + rel[3] * dy + rel[6] * dz)
     ey = -(rel[1] * dx + rel[4] * dy + rel[7] * dz)
     ez = -(rel[2] * dx + rel[5] * dy + rel[8] * dz)
-    x, y, z, hints[1] = support(ints, floats, points, first, around, b, ex, ey, ez, hints[1])
+    x, y, z, vertex = support(ints, floats, points, graph, b, ex, ey, ez, s[AXIS, 4])
+    s[AXIS, 4] = vertex
     bx = rel[0] * x + rel[1] * y + rel[2] * z + rel[9]
     by = rel[3] * x + rel[4] * y + rel[5] * z + rel[10]
     bz = rel[6] * x + rel[7] * y + rel[8] * z + rel[11]
@@ -247,20 +258,21 @@ def reduce_simplex(ws, n, bary):
 
 
 @kernel(fast=False)
-def gjk(ints, floats, points, first, around, a, b, rel, ws, bary, axis, hints, above, below, relative_gap):
-    """Distance of the cores of shapes *a* and *b*, *rel* the pose of b in a.
+def gjk(ints, floats, points, graph, a, b, ws, above, below, relative_gap):
+    """Distance of the cores of shapes *a* and *b*; ``ws[REL]`` holds the pose of b in a.
 
     Stops as soon as the distance is known to be above *above*, or at most *below*, or within a relative gap.
     Returns ``(rows, lower, upper)``: bounds on the distance (both 0 when the cores overlap), and the rows of ``ws``
-    that carry the nearest points with weights ``bary``. ``axis`` (3,) is the first direction tried and receives the
+    that carry the nearest points with weights ``ws[BARY]``. ``ws[AXIS]`` is the first direction tried and receives the
     last one, from b towards a in the frame of a.
     """
+    rel, bary, axis = ws[REL], ws[BARY], ws[AXIS]
     vx, vy, vz = axis[0], axis[1], axis[2]
     if vx * vx + vy * vy + vz * vz < 1e-20:
         vx, vy, vz = -rel[9], -rel[10], -rel[11]
         if vx * vx + vy * vy + vz * vz < 1e-20:
             vx = 1.0
-    difference(ints, floats, points, first, around, a, b, rel, -vx, -vy, -vz, ws[0], hints)
+    difference(ints, floats, points, graph, a, b, -vx, -vy, -vz, ws, ws[0])
     norm = math.sqrt(vx * vx + vy * vy + vz * vz)
     lower = max(0.0, (vx * ws[0, 0] + vy * ws[0, 1] + vz * ws[0, 2]) / norm)
     if lower > above:
@@ -274,7 +286,7 @@ def gjk(ints, floats, points, first, around, a, b, rel, ws, bary, axis, hints, a
         upper = math.sqrt(vv)
         if vv <= TINY * TINY * size or upper <= below:
             break
-        difference(ints, floats, points, first, around, a, b, rel, -vx, -vy, -vz, ws[n], hints)
+        difference(ints, floats, points, graph, a, b, -vx, -vy, -vz, ws, ws[n])
         wx, wy, wz = ws[n, 0], ws[n, 1], ws[n, 2]
         vw = vx * wx + vy * wy + vz * wz
         lower = max(lower, vw / upper)
@@ -318,12 +330,13 @@ def gjk(ints, floats, points, first, around, a, b, rel, ws, bary, axis, hints, a
 
 
 @kernel(fast=False)
-def witnesses(ws, bary, rows, pa, pb):
+def witnesses(ws, rows):
     """The nearest points of the cores, in the frame of the first shape."""
+    bary = ws[BARY]
     for c in range(3):
         s, t = 0.0, 0.0
         for i in range(rows):
             s += bary[i] * ws[i, 3 + c]
             t += bary[i] * ws[i, 6 + c]
-        pa[c] = s
-        pb[c] = t
+        ws[NEAR, c] = s
+        ws[NEAR, 3 + c] = t

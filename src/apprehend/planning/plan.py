@@ -9,10 +9,10 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, BoolArray, as_shaped
+from ..arrays import Array, BoolArray, IntArray, as_shaped
 from ..collision import CollisionModel, Touch
 from ..errors import InputError
-from ..kernels import collide_plan
+from ..kernels import collide, collide_plan
 from ..kinematics import Robot
 from .result import PlanResult, PlanStatus
 
@@ -90,11 +90,7 @@ def plan(
         return answer(PlanStatus.GOALS_IN_COLLISION, **_why_goals(model, targets, within))
 
     near = np.argsort(np.linalg.norm(targets[usable] - q0, axis=1), kind="stable")
-    direct = int(
-        collide_plan.first_direct(
-            model.compiled, q0, targets, usable[near].astype(np.int64), model.clearance, model.resolution
-        )
-    )
+    direct = first_direct(model, q0, targets, usable[near])
     if direct >= 0:
         path = np.array([q0, targets[direct]]) if (targets[direct] != q0).any() else q0[None].copy()
         return answer(PlanStatus.SUCCESS, path=path, goal=direct)
@@ -121,6 +117,17 @@ def plan(
     if simplify:
         path = shortcut(model, path, rng=rng)
     return answer(PlanStatus.SUCCESS, path=path, goal=int(usable[root]), **spent)
+
+
+def first_direct(model: CollisionModel, start: Array, goals: Array, order: IntArray) -> int:
+    """The first of *goals* in *order* that a straight motion reaches, or −1."""
+    starts = np.repeat(start[None], len(goals), axis=0)
+    hit, where = np.zeros(len(goals), np.int64), np.zeros(len(goals))
+    collide.edges_many(
+        model.compiled, starts, goals, order, model.clearance, model.resolution, 0, len(order), hit, where
+    )
+    free = order[hit[order] < 0]
+    return int(free[0]) if len(free) else -1
 
 
 class Search:
