@@ -56,6 +56,14 @@ class Spline(PolynomialPath):
         made = CubicSpline(knots, points, bc_type=ends)
         super().__init__(knots, np.ascontiguousarray(np.transpose(made.c[::-1], (1, 0, 2))))
 
+    @classmethod
+    def through_knots(cls, points: Array, knots: Array) -> PolynomialPath:
+        """The spline of *points* that may repeat, at given *knots*."""
+        from scipy.interpolate import CubicSpline
+
+        made = CubicSpline(knots, points, bc_type="not-a-knot")
+        return PolynomialPath(knots, np.ascontiguousarray(np.transpose(made.c[::-1], (1, 0, 2))))
+
 
 def chord_knots(points: Array, exponent: float = 1.0) -> Array:
     """Knots on [0, 1] whose spacing is the chord length to the power *exponent*."""
