@@ -22,14 +22,18 @@ from .description import (
     ShapeKind,
     Tendon,
 )
+from .dh import DHTable
+from .dh_derive import dh_table
 from .load import load_description
 from .meshes import link_surface, load_shape_mesh, read_mesh, shape_surface
 from .mjcf import read_mjcf
 from .srdf import Semantics, read_srdf
+from .table_files import read_dh, read_table
 from .urdf import parse_urdf, read_urdf
 
 __all__ = [
     "Actuator",
+    "DHTable",
     "Description",
     "Inertial",
     "Joint",
@@ -45,13 +49,16 @@ __all__ = [
     "Tendon",
     "attach",
     "catalogue",
+    "dh_table",
     "link_surface",
     "load_description",
     "load_shape_mesh",
     "parse_urdf",
+    "read_dh",
     "read_mesh",
     "read_mjcf",
     "read_srdf",
+    "read_table",
     "read_urdf",
     "renamed",
     "shape_surface",

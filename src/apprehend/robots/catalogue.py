@@ -38,6 +38,7 @@ class Entry:
     like: str = ""
     tool: str = ""
     incomplete: str = ""
+    inertias: str = ""
     home: Mapping[str, float] = field(default_factory=dict)
     limits: tuple[Mapping[str, Any], ...] = ()
 

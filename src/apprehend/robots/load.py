@@ -14,9 +14,10 @@ from .menagerie import PREFIX, menagerie_file
 from .mjcf import read_mjcf
 from .paths import Packages
 from .srdf import allowed_within, beside, read_srdf
+from .table_files import read_table
 from .urdf import read_urdf
 
-SUFFIXES = (".urdf", ".xml", ".mjcf")
+SUFFIXES = (".urdf", ".xml", ".mjcf", ".toml")
 
 
 def load_description(
@@ -30,10 +31,11 @@ def load_description(
     """The description of a robot or hand.
 
     *name_or_path* is a name of the catalogue (``"ur5e"``, ``"panda"``, ``"robotiq_2f_85"``; see `catalogue`),
-    ``"menagerie:NAME"``, or the path of a URDF (``.urdf``) or MJCF (``.xml``) file. *packages* are the folders of mesh
-    names; *meshes* is ``"require"`` or ``"ignore"`` for missing mesh files; *inertias* is ``"repair"``, ``"keep"`` or
-    ``"refuse"`` for values that no body can have; *loops* is ``"refuse"`` or ``"cut"`` for closed chains. An SRDF
-    beside a URDF (same stem, or ``../srdf``) adds the pairs of links that may touch.
+    ``"menagerie:NAME"``, or the path of a file: URDF (``.urdf``), MJCF (``.xml``), DH table or twists (``.toml``).
+    *packages* are the folders of mesh names; *meshes* is ``"require"`` or ``"ignore"`` for missing mesh files;
+    *inertias* is ``"repair"``, ``"keep"`` or ``"refuse"`` for values that no body can have; *loops* is ``"refuse"`` or
+    ``"cut"`` for closed chains. An SRDF beside a URDF (same stem, or ``../srdf``) adds the pairs of links that may
+    touch.
     """
     text = str(name_or_path)
     path = Path(name_or_path)
@@ -43,6 +45,8 @@ def load_description(
     is_name = isinstance(name_or_path, str) and not path.suffix and "/" not in text
     if is_name and (text in catalogue.entries() or not path.exists()):
         entry = catalogue.entry(text)
+        if entry.inertias:
+            options = replace(options, inertias=entry.inertias)
         description = read_file(entry.file(), options)
         if entry.root:
             description = subtree(description, entry.root)
@@ -79,6 +83,8 @@ def read_file(path: Path, options: Options) -> Description:
         )  # fmt: skip
     if suffix in (".xml", ".mjcf"):
         return read_mjcf(path, packages=options.packages, meshes=options.meshes, loops=options.loops)
+    if suffix == ".toml":
+        return read_table(path, inertias=options.inertias)
     if not path.exists():
         raise DescriptionError(f"{path} does not exist; expected a file, or a name of the catalogue such as 'panda'")
     raise DescriptionError(f"{path}: files of type {suffix!r} are not read; expected one of {', '.join(SUFFIXES)}")
