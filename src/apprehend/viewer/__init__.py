@@ -1,7 +1,24 @@
-"""The viewer: pictures without a graphics card, the report of an episode, and a live page in the browser."""
+"""The viewer: pictures without a graphics card, the report of an episode, and live pages in the browser."""
 
+from .live import Page
+from .pages import show_body, show_grasp, show_robot
 from .picture import Camera, Image, Item, jpeg, png, render
+from .replay import show
 from .report import write_report
 from .stage import Stage
 
-__all__ = ["Camera", "Image", "Item", "Stage", "jpeg", "png", "render", "write_report"]
+__all__ = [
+    "Camera",
+    "Image",
+    "Item",
+    "Page",
+    "Stage",
+    "jpeg",
+    "png",
+    "render",
+    "show",
+    "show_body",
+    "show_grasp",
+    "show_robot",
+    "write_report",
+]

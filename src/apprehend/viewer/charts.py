@@ -1,4 +1,4 @@
-"""Which charts an episode gets: loads as a share of their limits, contact force, height, and every joint."""
+"""Which charts an episode gets: loads as a share of their limits, force, the object's way, and every joint."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from .stage import Stage
 SHADES = 8
 
 
-def episode_charts(record: Record, stage: Stage, data: Mapping[str, Any]) -> list[Chart]:
-    """Charts over the whole episode first (they have bands), then one for each joint."""
-    charts = [
-        c
-        for c in (
-            _share(record, record.qd, "velocity", "Joint speed"),
-            _share(record, record.tau, "effort", "Joint torque"),
-            _force(record),
-            _height(record, data),
-        )
-        if c
-    ]
-    return charts + [_joint(record, stage, i) for i in range(len(record.joints))]
+def load_charts(record: Record, data: Mapping[str, Any]) -> list[Chart]:
+    """Charts over the whole episode, with the steps as bands: speeds, torques, force, and where the object is."""
+    charts = (
+        _share(record, record.qd, "velocity", "Joint speed"),
+        _share(record, record.tau, "effort", "Joint torque"),
+        _force(record),
+        _height(record, data),
+    )
+    return [chart for chart in charts if chart is not None]
+
+
+def joint_charts(record: Record, stage: Stage) -> list[Chart]:
+    """One chart for each joint: its position, and its limits where they are near."""
+    return [_joint(record, stage, i) for i in range(len(record.joints))]
 
 
 def _shade(record: Record, joint: int) -> int:

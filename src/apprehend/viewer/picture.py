@@ -123,7 +123,8 @@ def render(
     if camera is None:
         camera = Camera.around(corners_of(low, high), aspect=width / height)
     solid = [item for item in items if item.rgba[3] >= 1.0]
-    base, depth = _layer(ground + solid, camera, size, (low, high))
+    light = _Light.of(ground + solid, camera, (low, high))
+    base, depth = _layer(ground + solid, camera, size, light)
     rows = np.linspace(0.0, 1.0, height * SAMPLES)[:, None, None]
     backdrop = _linear(np.array(background[0])) * (1.0 - rows) + _linear(np.array(background[1])) * rows
     backdrop = np.broadcast_to(backdrop, base.shape)
@@ -132,9 +133,9 @@ def render(
         image = _into_the_distance(image, depth, backdrop, camera, low, high)
     for item in items:
         if item.rgba[3] < 1.0:
-            over, over_depth = _layer([item], camera, size, (low, high))
-            image[over_depth < depth] *= 1.0 - item.rgba[3]
-            image[over_depth < depth] += item.rgba[3] * over[over_depth < depth]
+            over, over_depth = _layer([item], camera, size, light, shut_in=False)
+            front = over_depth < depth
+            image[front] = (1.0 - item.rgba[3]) * image[front] + item.rgba[3] * over[front]
     small = np.empty((height, width, 3))
     parallel.over_ranges(lambda a, b: raster.average(image, SAMPLES, a, b, small), height, 16)
     return np.asarray(np.clip(_encoded(small) * 255.0 + 0.5, 0.0, 255.0), dtype=np.uint8)
@@ -199,10 +200,45 @@ def _encoded(linear: Array) -> Array:
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1.0 / 2.4) - 0.055)
 
 
+@dataclass(frozen=True, eq=False)
+class _Light:
+    """The sun and what it reaches: rows ``(3, 4)`` from the world to pixel and depth of the shadow map."""
+
+    sun: Array
+    rows: Array
+    depth: Array
+    texel: float  # size of a pixel of the map in m
+    radius: float  # of the surroundings that keep ambient light out, in m
+
+    @classmethod
+    def of(cls, items: Sequence[Item], camera: Camera, box: tuple[Array, Array]) -> _Light:
+        """The shadows of *items*, finest in *box*; the sun is high on the camera's left."""
+        away = camera.eye - camera.target
+        azimuth = math.atan2(away[1], away[0]) + SUN_AZIMUTH
+        flat = math.cos(SUN_ELEVATION)
+        sun = np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(SUN_ELEVATION)])
+        right, down, forward = _axes(-sun)
+        middle, size = 0.5 * (box[0] + box[1]), float(np.linalg.norm(box[1] - box[0])) + 1e-6
+        scale = SHADOW_PIXELS / (1.02 * size)
+        rows = np.zeros((3, 4))
+        rows[0, :3], rows[0, 3] = scale * right, 0.5 * SHADOW_PIXELS - scale * (right @ middle)
+        rows[1, :3], rows[1, 3] = scale * down, 0.5 * SHADOW_PIXELS - scale * (down @ middle)
+        rows[2, :3] = forward
+        depth, face, bary = raster.empty_buffers(SHADOW_PIXELS, SHADOW_PIXELS)
+        casting = [_placed(item)[item.faces] for item in items if item.shadow]
+        if casting:
+            corners = np.concatenate(casting)
+            screen = np.ones(corners.shape)
+            screen[..., :2] = corners @ rows[:2, :3].T + rows[:2, 3]
+            z = np.ascontiguousarray(corners @ forward)
+            parallel.over_ranges(lambda a, b: raster.rasterise(screen, z, a, b, depth, face, bary), SHADOW_PIXELS, 64)
+        return cls(sun, rows, depth.astype(np.float32), 1.0 / scale, 0.08 * size)
+
+
 def _layer(
-    items: Sequence[Item], camera: Camera, size: tuple[int, int], box: tuple[Array, Array]
+    items: Sequence[Item], camera: Camera, size: tuple[int, int], light: _Light, *, shut_in: bool = True
 ) -> tuple[Array, Array]:
-    """Linear colours and depths of all samples; the shadows are finest in *box*."""
+    """Linear colours and depths of all samples; *shut_in* says whether corners keep ambient light out."""
     width, height = size[0] * SAMPLES, size[1] * SAMPLES
     out = np.zeros((height, width, 3))
     depth, face, bary = raster.empty_buffers(height, width)
@@ -213,18 +249,14 @@ def _layer(
     counts = [len(item.faces) for item in items]
     colour = np.repeat(_linear(np.array([item.rgba[:3] for item in items], dtype=np.float64)), counts, axis=0)
     gloss = np.repeat(np.array([item.gloss for item in items], dtype=np.float64), counts)
-    casts = np.repeat(np.array([item.shadow for item in items]), counts)
 
     right, down, forward = _axes(camera.target - camera.eye)
     focal = 0.5 * height / math.tan(camera.field_of_view / 2.0)
-    local = (corners - camera.eye) @ np.stack([right, down, forward], axis=1)
-    screen, z = local.copy(), np.ascontiguousarray(local[..., 2])
-    screen[..., 0] = focal * local[..., 0] + 0.5 * width * z
-    screen[..., 1] = focal * local[..., 1] + 0.5 * height * z
+    screen = (corners - camera.eye) @ np.stack([right, down, forward], axis=1)
+    z = np.ascontiguousarray(screen[..., 2])
+    screen[..., 0] = focal * screen[..., 0] + 0.5 * width * z
+    screen[..., 1] = focal * screen[..., 1] + 0.5 * height * z
     point, normal = np.zeros((height, width, 3)), np.zeros((height, width, 3))
-    sun, taps = _sun(forward), raster.spirals(16, 12, 0.5)
-    light, light_depth, texel = _light_map(corners[casts], box, sun)
-    radius = 0.08 * float(np.linalg.norm(box[1] - box[0]))
     eye = np.ascontiguousarray(camera.eye, dtype=np.float64)
 
     def draw(a: int, b: int) -> None:
@@ -232,11 +264,12 @@ def _layer(
         raster.surface(face, bary, corners, normals, eye, a, b, point, normal)
 
     parallel.over_ranges(draw, height, 64)
-    sky = _open_sky(depth, point, normal, focal, radius)
+    sky = _open_sky(depth, point, normal, focal, light.radius) if shut_in else np.ones((height, width))
+    step, taps = 2.0 * light.texel, raster.spirals(16, 12, 0.5)
 
     def colour_in(a: int, b: int) -> None:
         raster.shade(
-            face, point, normal, sky, colour, gloss, eye, sun, light, light_depth, 2.0 * texel, 5.0, taps, a, b, out
+            face, point, normal, sky, colour, gloss, eye, light.sun, light.rows, light.depth, step, 5.0, taps, a, b, out
         )  # fmt: skip
 
     parallel.over_ranges(colour_in, height, 64)
@@ -258,32 +291,6 @@ def _open_sky(depth: Array, point: Array, normal: Array, focal: float, radius: f
     )
     parallel.over_ranges(lambda a, b: raster.spread(seen, small, depth, SAMPLES, radius, a, b, out), len(depth), 64)
     return out
-
-
-def _sun(forward: Array) -> Array:
-    """Direction to the sun: high on the left of the camera and a little behind what it sees."""
-    azimuth = math.atan2(-forward[1], -forward[0]) + SUN_AZIMUTH
-    flat = math.cos(SUN_ELEVATION)
-    return np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(SUN_ELEVATION)])
-
-
-def _light_map(corners: Array, box: tuple[Array, Array], sun: Array) -> tuple[Array, Array, float]:
-    """World-to-shadow-map rows (3, 4), the map's depths, and the size of one of its pixels in m."""
-    right, down, forward = _axes(-sun)
-    middle = 0.5 * (box[0] + box[1])
-    reach = 0.5 * float(np.linalg.norm(box[1] - box[0])) * 1.02 + 1e-6
-    scale = 0.5 * SHADOW_PIXELS / reach
-    light = np.zeros((3, 4))
-    light[0, :3], light[0, 3] = scale * right, 0.5 * SHADOW_PIXELS - scale * (right @ middle)
-    light[1, :3], light[1, 3] = scale * down, 0.5 * SHADOW_PIXELS - scale * (down @ middle)
-    light[2, :3] = forward
-    depth, face, bary = raster.empty_buffers(SHADOW_PIXELS, SHADOW_PIXELS)
-    if len(corners):
-        screen = np.ones(corners.shape)
-        screen[..., :2] = corners @ light[:2, :3].T + light[:2, 3]
-        z = np.ascontiguousarray(corners @ forward)
-        parallel.over_ranges(lambda a, b: raster.rasterise(screen, z, a, b, depth, face, bary), SHADOW_PIXELS, 64)
-    return light, depth.astype(np.float32), 1.0 / scale
 
 
 def _corner_normals(item: Item) -> Array:

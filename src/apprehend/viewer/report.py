@@ -7,26 +7,25 @@ import html
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arrays import Array
 from ..files import replace_file
-from .charts import episode_charts
-from .picture import Camera, Image, Item, jpeg, render
+from .charts import joint_charts, load_charts
+from .picture import Image, jpeg
 from .plots import Chart, legend, svg
 from .record import Record
 from .stage import Stage, read
+from .studio import Studio
 from .style import CSS, SCRIPT
 from .words import number, quantity
 
 if TYPE_CHECKING:
     from ..process import Episode
 
-HERO, FRAME = (1200, 800), (560, 400)
+HERO, FRAME = (1020, 700), (500, 356)
 """Sizes of the pictures in pixels."""
 FRAMES = 8
 """Most pictures in the film strip."""
@@ -47,8 +46,8 @@ def write_report(episode: str | Path | Mapping[str, Any] | Episode, path: str | 
 def page(data: Mapping[str, Any], stage: Stage) -> str:
     """The text of the report."""
     record = Record.of(data) if data.get("recording", {}).get("t") else None
-    charts = episode_charts(record, stage, data) if record else []
-    studio = _Studio.of(stage, record)
+    charts = [*load_charts(record, data), *joint_charts(record, stage)] if record else []
+    studio = Studio.of(stage, record)
     body = [
         _head(data),
         f'<div class="top">{_hero(studio, data)}<div class="tiles">{_tiles(data, record)}</div></div>',
@@ -74,48 +73,7 @@ def _head(data: Mapping[str, Any]) -> str:
     return f'<h1>{html.escape(data["title"])}</h1><div class="verdict">{badge}<span>{reason}</span></div>'
 
 
-@dataclass(frozen=True, eq=False)
-class _Studio:
-    """The stage with one camera position and one light for all pictures of a report."""
-
-    stage: Stage
-    record: Record | None
-    seen: Array  # points that must be in the picture
-    azimuth: float
-
-    @classmethod
-    def of(cls, stage: Stage, record: Record | None) -> _Studio:
-        """Everything that moves, at a dozen moments, is to be seen; the camera stands beside the robot's front."""
-        moments = np.linspace(0, len(record.time) - 1, 12).astype(int).tolist() if record else [None]
-        scenery = len(stage.boxes)
-        points = []
-        for moment in moments:
-            items = cls._items(stage, record, moment)
-            end = len(items) - len(stage.ghosts)
-            cast = (items[: end - scenery] + items[end:]) or items  # boxes reach out of the picture
-            points += [i.vertices[:: max(1, len(i.vertices) // 60)] @ i.pose[:3, :3].T + i.pose[:3, 3] for i in cast]
-        facing = 0.0
-        if stage.robot is not None and stage.bodies:
-            ahead = np.mean([t.pose[:2, 3] for t in (*stage.bodies, *stage.ghosts)], axis=0) - stage.robot.base[:2, 3]
-            facing = math.atan2(ahead[1], ahead[0])
-        return cls(stage, record, np.vstack(points), facing - math.radians(50.0))
-
-    @staticmethod
-    def _items(stage: Stage, record: Record | None, moment: int | None) -> list[Item]:
-        if record is None or moment is None:
-            return stage.items()
-        return stage.items(record.q[moment], record.poses(moment))
-
-    def shot(self, moment: int | None, size: tuple[int, int]) -> Image:
-        """The picture at one sample of the recording."""
-        camera = Camera.around(
-            self.seen, azimuth=self.azimuth, elevation=math.radians(20.0), aspect=size[0] / size[1], margin=1.12
-        )
-        focus = self.seen.min(axis=0), self.seen.max(axis=0)
-        return render(self._items(self.stage, self.record, moment), camera, size=size, focus=focus)
-
-
-def _hero(studio: _Studio, data: Mapping[str, Any]) -> str:
+def _hero(studio: Studio, data: Mapping[str, Any]) -> str:
     record = studio.record
     if record is None:
         return _figure(studio.shot(None, HERO), "The scene")
@@ -130,7 +88,7 @@ def _hero(studio: _Studio, data: Mapping[str, Any]) -> str:
     return _figure(studio.shot(sample, HERO), f"<b>{html.escape(caption)}</b> at {record.time[sample]:.2f} s{goal}")
 
 
-def _film(studio: _Studio) -> str:
+def _film(studio: Studio) -> str:
     record = studio.record
     if record is None:
         return ""

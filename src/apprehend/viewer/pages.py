@@ -1,0 +1,248 @@
+"""Pages to look at one thing: a robot with a slider for every joint, a body, or grasps of a body by a hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..arrays import Array
+from ..errors import InputError
+from .live import HOST, Announce, Page
+from .looks import RGBA, link_parts
+from .marks import arrow, friction_cone
+from .picture import Camera, bounds, corners_of
+from .replay import switch
+from .stage import BODY_COLOURS, Stage, Thing
+from .words import number, significant
+
+if TYPE_CHECKING:
+    from ..bodies import Body, RestPose
+    from ..grasp.candidates import Candidate
+    from ..kinematics import Hand, Robot
+
+PIECE_COLOURS: tuple[RGBA, ...] = tuple(
+    (0.5 + 0.4 * math.cos(2.4 * i), 0.5 + 0.4 * math.cos(2.4 * i + 2.1), 0.5 + 0.4 * math.cos(2.4 * i + 4.2), 1.0)
+    for i in range(12)
+)
+
+
+def show_robot(
+    robot: Robot,
+    *,
+    port: int = 8080,
+    host: str = HOST,
+    open_browser: bool = True,
+    block: bool = True,
+    announce: Announce | None = None,
+) -> Page:
+    """A page with *robot* and a slider for every joint, in degrees or millimetres; frames can be shown."""
+    stage = Stage(robot, link_parts(robot.description))
+    page = Page(robot.name, port=port, host=host)
+    try:
+        _robot_controls(page, robot, stage)
+    except BaseException:
+        page.stop()
+        raise
+    return page.serve(open_browser=open_browser, block=block, announce=announce)
+
+
+def _robot_controls(page: Page, robot: Robot, stage: Stage) -> None:
+    from ..robots.description import JointType
+
+    page.add(stage)
+    items = stage.items()
+    low, high = bounds(items) if items else (np.full(3, -0.5), np.full(3, 0.5))
+    page.grid(float((high - low).max()))
+    page.look(Camera.around(corners_of(low, high)))
+    gui = page.server.gui
+    gui.add_markdown(f"**{robot.name}**: {robot.n} joints, {len(robot.frame_names)} frames, {robot.mass:.2f} kg")
+    q = robot.home.copy()
+    sliders: list[tuple[int, float, Any]] = []
+
+    def move(_: Any) -> None:
+        for i, factor, slider in sliders:
+            q[i] = slider.value / factor
+        page.draw(dict(zip(robot.frame_names, robot.fk(q))))
+
+    with gui.add_folder("Joints"):
+        reset = gui.add_button("Home")
+        for i, name in enumerate(robot.joint_names):
+            sliding = robot.description.joint(name).type is JointType.PRISMATIC
+            factor, unit = (1e3, "mm") if sliding else (180.0 / math.pi, "°")
+            lower, upper = factor * robot.limits.lower[i], factor * robot.limits.upper[i]
+            lower = lower if np.isfinite(lower) else -180.0 if not sliding else -1000.0
+            upper = upper if np.isfinite(upper) else 180.0 if not sliding else 1000.0
+            start = min(max(factor * float(q[i]), lower), upper)
+            slider = gui.add_slider(f"{name} {unit}", lower, max(upper, lower + 0.1), 0.1, start)
+            slider.on_update(move)
+            sliders.append((i, factor, slider))
+
+    def home(_: Any) -> None:
+        for i, factor, slider in sliders:
+            slider.value = factor * float(robot.home[i])
+        q[:] = robot.home
+        page.draw(dict(zip(robot.frame_names, robot.fk(q))))
+
+    reset.on_click(home)
+    with gui.add_folder("Show"):
+        size = 0.06 * float((high - low).max())
+        frames = [
+            page.server.scene.add_frame(f"/robot/{name}/axes", axes_length=size, axes_radius=0.04 * size, visible=False)
+            for name in page.link_names
+        ]
+        switch(gui, "frames of the links", frames, shown=False)
+
+
+def show_body(
+    body: Body,
+    *,
+    port: int = 8080,
+    host: str = HOST,
+    open_browser: bool = True,
+    block: bool = True,
+    announce: Announce | None = None,
+) -> Page:
+    """A page with *body*: its mass properties, its resting poses, and its convex pieces."""
+    page = Page(body.name, port=port, host=host)
+    try:
+        _body_controls(page, body)
+    except BaseException:
+        page.stop()
+        raise
+    return page.serve(open_browser=open_browser, block=block, announce=announce)
+
+
+def _body_controls(page: Page, body: Body) -> None:
+    poses = body.stable_poses(min_probability=0.001)
+    page.add(Stage(bodies=(Thing(body.name, body.vertices, body.faces, poses[0].pose, BODY_COLOURS[0]),)))
+    reach = body.radius
+    page.grid(2.0 * reach)
+    page.look(Camera.around(corners_of(np.array([-reach, -reach, 0.0]), np.array([reach, reach, 2.0 * reach]))))
+    gui, scene = page.server.gui, page.server.scene
+    gui.add_markdown(facts(body))
+    names = [_pose_name(i, pose) for i, pose in enumerate(poses)]
+    chosen = gui.add_dropdown("resting pose", tuple(names))
+    chosen.on_update(lambda _: page.draw(bodies={body.name: poses[names.index(chosen.value)].pose}))
+    below = f"/bodies/{body.name}"
+    with gui.add_folder("Show"):
+        surface = page.handles[f"{below}/mesh"]
+        switch(gui, "surface", [surface])
+        moments, axes = np.linalg.eigh(body.inertia)
+        lengths = 0.9 * reach * np.sqrt(moments[0] / moments)
+        marks = [scene.add_icosphere(f"{below}/com", radius=0.05 * reach, color=(20, 20, 20), position=body.com)]
+        colours: tuple[RGBA, ...] = ((0.85, 0.2, 0.2, 1.0), (0.2, 0.65, 0.25, 1.0), (0.2, 0.35, 0.85, 1.0))
+        for k in range(3):
+            mesh = arrow(body.com, lengths[k] * axes[:, k], 0.012 * reach)
+            marks.append(page.mesh(f"{below}/axis{k}", *mesh, colours[k]))
+        for mark in marks:
+            mark.visible = False
+        switch(gui, "centre of mass and principal axes", marks, shown=False)
+        pieces = gui.add_checkbox("convex pieces", False, hint="computed the first time, then kept on disk")
+        made: list[Any] = []
+
+        def show_pieces(_: Any) -> None:
+            if pieces.value and not made:
+                for i, (vertices, faces) in enumerate(body.convex_pieces):
+                    made.append(page.mesh(f"{below}/piece{i}", vertices, faces, PIECE_COLOURS[i % len(PIECE_COLOURS)]))
+                gui.add_markdown(f"{len(made)} pieces, within {1e3 * body.convex_error:.1f} mm of the surface")
+            for handle in made:
+                handle.visible = pieces.value
+
+        pieces.on_update(show_pieces)
+
+
+def facts(body: Body) -> str:
+    """What is known of a body, as Markdown for a person."""
+    size = " × ".join(f"{1e3 * x:.1f}" for x in body.extents)
+    moments = ", ".join(significant(1e6 * m) for m in np.linalg.eigvalsh(body.inertia))
+    repairs = "".join(f"\n* repaired: {note}" for note in body.repairs)
+    source = {"given": "given", "density": "from the density", "assumed": "assumed density"}[body.mass_source]
+    return (
+        f"**{body.name}**\n\n* size {size} mm\n* mass {number(body.mass, 3)} kg ({source}), "
+        f"volume {significant(1e6 * body.volume)} cm³\n* principal moments of inertia {moments} kg mm²\n"
+        f"* friction µ = {body.friction:g}\n* {len(body.faces)} triangles, "
+        f"{'closed' if body.watertight else 'open'}{repairs}"
+    )
+
+
+def _pose_name(index: int, pose: RestPose) -> str:
+    return f"{index + 1}: {100 * pose.probability:.1f} %, tips at {math.degrees(pose.tip_angle):.0f}°"
+
+
+def show_grasp(
+    body: Body,
+    candidates: Candidate | Sequence[Candidate],
+    hand: Hand,
+    *,
+    port: int = 8080,
+    host: str = HOST,
+    open_browser: bool = True,
+    block: bool = True,
+    announce: Announce | None = None,
+) -> Page:
+    """A page with *body* and *hand* at each of the *candidates* (best first), contacts and friction cones drawn."""
+    from ..grasp.candidates import Candidate
+
+    options = [candidates] if isinstance(candidates, Candidate) else list(candidates)
+    if not options:
+        raise InputError("there are no grasps to show: candidates is empty; the plan's explain() says why")
+    page = Page(f"grasps of {body.name}", port=port, host=host)
+    try:
+        _grasp_controls(page, body, options, hand)
+    except BaseException:
+        page.stop()
+        raise
+    return page.serve(open_browser=open_browser, block=block, announce=announce)
+
+
+def _grasp_controls(page: Page, body: Body, options: Sequence[Candidate], hand: Hand) -> None:
+    robot = hand.robot
+    stage = Stage(
+        robot, link_parts(robot.description), (Thing(body.name, body.vertices, body.faces, np.eye(4), BODY_COLOURS[0]),)
+    )
+    page.add(stage)
+    reach = body.radius + 0.12
+    page.look(Camera.around(corners_of(body.com - reach, body.com + reach), margin=1.0))
+    gui = page.server.gui
+    text = gui.add_markdown("")
+    rank = gui.add_slider("rank", 1, max(len(options), 2), 1, 1, disabled=len(options) < 2)
+    back = gui.add_slider("retreat in mm", 0, 150, 1, 0)
+    marks: list[Any] = []
+
+    def draw(_: Any) -> None:
+        grasp = options[min(int(rank.value), len(options)) - 1]
+        retreat = 1e-3 * back.value
+        q = robot.home.copy() if not hand.is_jaw else hand.jaw.q_at(grasp.opening if retreat else grasp.width)
+        frames = _hand_frames(grasp.retreated(retreat), robot, q)
+        page.draw(links=dict(zip(robot.frame_names, frames)))
+        for mark in marks:
+            mark.remove()
+        marks.clear()
+        for i, contact in enumerate(grasp.contacts):
+            cone = friction_cone(contact.position, contact.normal, contact.friction, 0.4 * body.radius)
+            marks.append(page.mesh(f"/contacts/cone{i}", *cone, (0.16, 0.45, 0.80, 0.35)))
+        text.content = describe(grasp)
+
+    rank.on_update(draw)
+    back.on_update(draw)
+    draw(None)
+
+
+def _hand_frames(T_body_hand: Array, robot: Robot, q: Array) -> Array:
+    """Poses ``(F, 4, 4)`` of the hand's frames in the body's frame, its root link at *T_body_hand*."""
+    frames = robot.fk(q)
+    return np.asarray(T_body_hand @ np.linalg.inv(frames[0]) @ frames)
+
+
+def describe(grasp: Candidate) -> str:
+    """The facts of a grasp, as Markdown for a person."""
+    from .words import quantity
+
+    margins = "".join(f"\n* {k.replace('_', ' ')}: {quantity(k, v)}" for k, v in grasp.margins.items())
+    return (
+        f"**quality {grasp.quality:.3f}**, {1e3 * grasp.width:.1f} mm wide, "
+        f"needs {grasp.required_force:.1f} N at each pad\n{margins}"
+    )
