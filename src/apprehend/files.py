@@ -20,11 +20,22 @@ def replace_file(path: str | Path) -> Iterator[Path]:
     handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=target.parent)
     os.close(handle)
     work = Path(name)
+    mask = os.umask(0)
+    os.umask(mask)
+    work.chmod(0o666 & ~mask)  # a temporary file is private; a written one is as readable as any other
     try:
         yield work
+        work.chmod(0o666 & ~_umask())
         work.replace(target)
     finally:
         work.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    """The process's mask for new files; temporary files are made readable by their owner alone."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 @contextmanager
@@ -42,7 +53,7 @@ def replace_directory(path: str | Path, marker: str) -> Iterator[Path]:
     work = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
     try:
         yield work
-        work.chmod(0o755)
+        work.chmod(0o777 & ~_umask())
         if target.exists():
             shutil.rmtree(target)
         work.replace(target)

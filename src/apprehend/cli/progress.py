@@ -58,7 +58,7 @@ class Checklist(Observer):
         line = Table.grid(padding=(0, 1))
         line.add_column(width=1)
         line.add_column(width=27, no_wrap=True)
-        line.add_column(justify="right", width=7)
+        line.add_column(justify="right", width=9, no_wrap=True)
         line.add_column(ratio=1)
         line.add_row(
             Text(mark, colour), Text(record.title), Text(f"{record.duration:.2f} s", "dim"), Text(record.message, "dim")
