@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, as_array, as_shaped
 from ..errors import InputError, MeshError
+from ..files import replace_file
 from . import rest
 from .convex import ConvexParts, Piece, decompose
-from .files import write_whole
 from .load import check_mesh, read_mesh
 from .mass import Solid, check_inertia, solid
 from .repair import Mended, mend, union
@@ -299,7 +299,8 @@ class Body:
         mesh = trimesh.Trimesh(self.vertices, self.faces, process=False)
         options: dict[str, Any] = {"digits": 9} if path.suffix.lower() == ".obj" else {}
         data: Any = mesh.export(file_type=path.suffix.lower()[1:], **options)
-        write_whole(path, data.encode() if isinstance(data, str) else data)
+        with replace_file(path) as work:
+            work.write_bytes(data.encode() if isinstance(data, str) else data)
         return path
 
 

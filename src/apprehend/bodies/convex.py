@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import Array, IntArray
+from ..files import replace_file
 from . import topology
-from .files import cache_folder, write_whole
+from .files import cache_folder
 from .mass import solid
 from .surface import sample, unit_normals
 
@@ -221,13 +222,12 @@ def point_triangle_squared(points: Array, triangles: Array) -> Array:
 
 
 def _write(path: Path, parts: ConvexParts) -> None:
-    buffer = io.BytesIO()
     arrays = {"error": np.array(parts.error), "count": np.array(len(parts.pieces))}
     for i, (v, f) in enumerate(parts.pieces):
         arrays[f"v{i}"], arrays[f"f{i}"] = v, f
-    np.savez(buffer, **arrays)  # type: ignore[arg-type]
     try:
-        write_whole(path, buffer.getvalue())
+        with replace_file(path) as work:
+            np.savez(work, **arrays)  # type: ignore[arg-type]
     except OSError:
         return  # a cache that cannot be written only costs time
 

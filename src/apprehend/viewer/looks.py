@@ -5,22 +5,28 @@ Colours come from the description, else from the materials of the mesh file, els
 
 from __future__ import annotations
 
+import hashlib
+import io
 import warnings
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array, IntArray
+from ..bodies.files import cache_folder
 from ..errors import ApprehendError
+from ..files import replace_file
 from ..robots.description import Description, Shape, ShapeKind
 from ..robots.meshes import load_shape_mesh, shape_surface
 from .picture import smooth_normals
 
 RGBA = tuple[float, float, float, float]
+Piece = tuple[Array, IntArray, RGBA]
 
 GREY: RGBA = (0.78, 0.79, 0.80, 1.0)
 """A link of which nobody says the colour."""
@@ -64,19 +70,53 @@ def _parts(shape: Shape) -> list[Part]:
     if shape.kind is not ShapeKind.MESH or shape.mesh is None:
         vertices, faces = shape_surface(shape)
         return [Part(vertices, faces, shape.rgba or GREY)]
-    pieces = None
-    if shape.rgba is None:
-        vertices, _ = load_shape_mesh(shape)
-        pieces = _by_material(shape.mesh, shape.size, vertices.min(axis=0).tobytes() + vertices.max(axis=0).tobytes())
-    if pieces is None:
-        pieces = [(*load_shape_mesh(shape), shape.rgba or GREY)]
     R, p = shape.pose[:3, :3], shape.pose[:3, 3]
-    return [Part(v @ R.T + p, f, rgba) for v, f, rgba in (_thinned(*piece) for piece in pieces)]
+    return [Part(v @ R.T + p, f, shape.rgba or rgba) for v, f, rgba in _mesh_pieces(shape)]
 
 
-@lru_cache(maxsize=256)
-def _by_material(path: Path, scale: tuple[float, ...], box: bytes) -> list[tuple[Array, IntArray, RGBA]] | None:
-    """The mesh of *path* in pieces of one colour each; None if that is not the same mesh (its *box* differs)."""
+def _mesh_pieces(shape: Shape) -> list[Piece]:
+    """The thinned pieces of a mesh shape, from the cache if the same file was read before."""
+    path = shape.mesh
+    assert path is not None
+    key = hashlib.sha256(f"1:{MOST_FACES}:{shape.size}:{shape.rgba is None}".encode())
+    try:
+        key.update(path.read_bytes())
+        for other in sorted(path.parent.glob("*.mtl")):
+            key.update(other.read_bytes())
+    except OSError:
+        return [_thinned(*load_shape_mesh(shape), GREY)]  # raises what is wrong with the file
+    kept = cache_folder("looks") / f"{key.hexdigest()[:32]}.npz"
+    pieces = _read(kept)
+    if pieces is None:
+        whole = load_shape_mesh(shape)
+        found = _by_material(path, shape.size, whole[0]) if shape.rgba is None else None
+        pieces = [_thinned(*piece) for piece in found or [(*whole, GREY)]]
+        _write(kept, pieces)
+    return pieces
+
+
+def _read(path: Path) -> list[Piece] | None:
+    try:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as data:
+            colours = data["rgba"].tolist()
+            return [(data[f"v{i}"], data[f"f{i}"], tuple(c)) for i, c in enumerate(colours)]
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None  # missing, or damaged: made again
+
+
+def _write(path: Path, pieces: list[Piece]) -> None:
+    arrays: dict[str, Any] = {"rgba": np.array([rgba for _, _, rgba in pieces])}
+    for i, (v, f, _) in enumerate(pieces):
+        arrays[f"v{i}"], arrays[f"f{i}"] = v, f
+    try:
+        with replace_file(path) as work:
+            np.savez(work, **arrays)
+    except OSError:
+        return  # a cache that cannot be written only costs time
+
+
+def _by_material(path: Path, scale: tuple[float, ...], whole: Array) -> list[Piece] | None:
+    """The mesh of *path* in pieces of one colour each; None if they do not span the same box as its *whole*."""
     import trimesh
 
     try:
@@ -93,8 +133,8 @@ def _by_material(path: Path, scale: tuple[float, ...], box: bytes) -> list[tuple
     if not pieces:
         return None
     everything = np.vstack([v for group in pieces.values() for v, _ in group])
-    low, high = np.frombuffer(box).reshape(2, 3)
-    if max(np.abs(everything.min(axis=0) - low).max(), np.abs(everything.max(axis=0) - high).max()) > 1e-5:
+    span = np.abs([everything.min(axis=0) - whole.min(axis=0), everything.max(axis=0) - whole.max(axis=0)])
+    if span.max() > 1e-5:
         return None
     turn = bool(np.prod(scale) < 0.0)
     return [(*_joined(group, turn), rgba) for rgba, group in pieces.items()]
@@ -117,7 +157,7 @@ def _joined(group: list[tuple[Array, IntArray]], turn: bool) -> tuple[Array, Int
     return np.vstack([v for v, _ in group]), faces[:, ::-1] if turn else faces
 
 
-def _thinned(vertices: Array, faces: IntArray, rgba: RGBA) -> tuple[Array, IntArray, RGBA]:
+def _thinned(vertices: Array, faces: IntArray, rgba: RGBA) -> Piece:
     if len(faces) <= MOST_FACES:
         return vertices, faces, rgba
     import fast_simplification
@@ -130,6 +170,3 @@ def _thinned(vertices: Array, faces: IntArray, rgba: RGBA) -> tuple[Array, IntAr
         ((vertices - centre) / size).astype(np.float32), faces.astype(np.int32), target_count=MOST_FACES
     )
     return np.asarray(v, dtype=np.float64) * size + centre, np.asarray(f, dtype=np.int64), rgba
-
-
-__all__ = ["GREY", "Part", "link_parts"]

@@ -72,17 +72,19 @@ def _robot_controls(page: Page, robot: Robot, stage: Stage) -> None:
         for i, name in enumerate(robot.joint_names):
             sliding = robot.description.joint(name).type is JointType.PRISMATIC
             factor, unit = (1e3, "mm") if sliding else (180.0 / math.pi, "°")
-            lower, upper = factor * robot.limits.lower[i], factor * robot.limits.upper[i]
-            lower = lower if np.isfinite(lower) else -180.0 if not sliding else -1000.0
-            upper = upper if np.isfinite(upper) else 180.0 if not sliding else 1000.0
-            start = min(max(factor * float(q[i]), lower), upper)
-            slider = gui.add_slider(f"{name} {unit}", lower, max(upper, lower + 0.1), 0.1, start)
+            free = 1000.0 if sliding else 180.0
+            lower, upper = factor * float(robot.limits.lower[i]), factor * float(robot.limits.upper[i])
+            lower = math.ceil(10.0 * lower) / 10.0 if math.isfinite(lower) else -free
+            upper = math.floor(10.0 * upper) / 10.0 if math.isfinite(upper) else free
+            upper = max(upper, lower + 0.1)
+            start = min(max(round(factor * float(q[i]), 1), lower), upper)
+            slider = gui.add_slider(f"{name} in {unit}", lower, upper, 0.1, start)
             slider.on_update(move)
             sliders.append((i, factor, slider))
 
     def home(_: Any) -> None:
         for i, factor, slider in sliders:
-            slider.value = factor * float(robot.home[i])
+            slider.value = round(factor * float(robot.home[i]), 1)
         q[:] = robot.home
         page.draw(dict(zip(robot.frame_names, robot.fk(q))))
 
@@ -204,7 +206,7 @@ def _grasp_controls(page: Page, body: Body, options: Sequence[Candidate], hand: 
         robot, link_parts(robot.description), (Thing(body.name, body.vertices, body.faces, np.eye(4), BODY_COLOURS[0]),)
     )
     page.add(stage)
-    reach = body.radius + 0.12
+    reach = body.radius + 0.05
     page.look(Camera.around(corners_of(body.com - reach, body.com + reach), margin=1.0))
     gui = page.server.gui
     text = gui.add_markdown("")
