@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..files import replace_file
 from . import topology
-from .files import cache_folder
+from .cache import cache_folder
 from .mass import solid
 from .surface import sample, unit_normals
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..bodies.files import cache_folder
+from ..bodies.cache import cache_folder
 from ..errors import ApprehendError
 from ..files import replace_file
 from ..robots.description import Description, Shape, ShapeKind
