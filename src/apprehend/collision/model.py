@@ -13,10 +13,12 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, BoolArray, IntArray, as_pose, as_shaped
 from ..errors import InputError, unknown_name
-from ..kernels import collide
+from ..kernels import collide, collide_edges, sphere
 from ..kernels.collide import CollideModel
+from ..kernels.sphere import SphereModel
 from ..kinematics import Robot
 from ..parallel import over_ranges
+from .lanes_model import sphere_model
 from .nodes import (
     Node,
     Pair,
@@ -42,6 +44,12 @@ ALWAYS = 0.95
 
 RESOLUTION = 1e-3
 """Default of `CollisionModel.resolution`, in m."""
+
+LANE_GRAIN = 512
+"""The same, for spheres on lanes."""
+
+WHOLE_TURNS = 1e4
+"""Joint values above this, in rad, are left to the exact check: lanes reduce angles to 1e5 only."""
 
 NONE = np.zeros(0, np.int64)
 NO_BLOCKS = np.zeros(0)
@@ -86,6 +94,8 @@ class CollisionModel:
     motion can miss: between the configurations that are checked nothing comes nearer than clearance − resolution.
     *allowed* are pairs of names that may touch, beyond those that are found: links that a joint connects, links that
     the description allows, couplings of one coordinate, and links that touch in nearly all random configurations.
+    *geometry* maps links to shapes in the link's frame that stand for all collision geometry of the description: a
+    hand-made model of spheres, for instance.
 
     Joint vectors are ``(..., n)`` of the whole robot. A model is a value: `attach`, `allow`, … make new ones.
     """
@@ -98,6 +108,7 @@ class CollisionModel:
         clearance: float | None = None,
         resolution: float = RESOLUTION,
         allowed: Iterable[tuple[str, str]] = (),
+        geometry: Mapping[str, Sequence[Convex]] | None = None,
     ) -> None:
         if clearance is None:
             clearance = scene.clearance if scene is not None else 0.0
@@ -108,7 +119,7 @@ class CollisionModel:
         self.robot = robot
         self.clearance = float(clearance)
         self.resolution = float(resolution)
-        links = link_nodes(robot)
+        links = link_nodes(robot, geometry)
         self.nodes: tuple[Node, ...] = links + obstacle_nodes(scene)
         twice = sorted({n.name for n in links} & {n.name for n in self.nodes[len(links) :]})
         if twice:
@@ -116,6 +127,7 @@ class CollisionModel:
         self.reasons: Mapping[Pair, str] = self._found_pairs(links)
         """Why each allowed pair may touch."""
         self._compiled: CollideModel | None = None
+        self._lanes: SphereModel | None = None
         self.reasons = {**self.reasons, **self._checked_pairs(allowed)}
 
     # --- what may touch ------------------------------------------------------------------------------------------
@@ -161,7 +173,7 @@ class CollisionModel:
     def _with(self, nodes: tuple[Node, ...], reasons: Mapping[Pair, str]) -> CollisionModel:
         other = object.__new__(CollisionModel)
         other.robot, other.clearance, other.resolution = self.robot, self.clearance, self.resolution
-        other.nodes, other.reasons, other._compiled = nodes, dict(reasons), None
+        other.nodes, other.reasons, other._compiled, other._lanes = nodes, dict(reasons), None, None
         return other
 
     def allow(self, pairs: Iterable[tuple[str, str]]) -> CollisionModel:
@@ -178,7 +190,7 @@ class CollisionModel:
         if not (math.isfinite(clearance) and clearance >= 0.0):
             raise InputError(f"clearance is {clearance}; expected 0 or more, in m")
         other = self._with(self.nodes, self.reasons)
-        other.clearance, other._compiled = float(clearance), self._compiled
+        other.clearance, other._compiled, other._lanes = float(clearance), self._compiled, self._lanes
         other.resolution = self.resolution if resolution is None else float(resolution)
         return other
 
@@ -274,6 +286,13 @@ class CollisionModel:
             self._compiled = compile_model(self.robot, self.nodes, blocks)
         return self._compiled
 
+    @property
+    def lanes(self) -> SphereModel:
+        """Arrays for the sphere kernels (layout: `apprehend.kernels.sphere`)."""
+        if self._lanes is None:
+            self._lanes = sphere_model(self.compiled, self.nodes)
+        return self._lanes
+
     # --- questions -----------------------------------------------------------------------------------------------
     def _rows(self, q: ArrayLike, name: str = "q") -> tuple[Array, tuple[int, ...]]:
         q = as_shaped(q, name, self.robot.n)
@@ -290,8 +309,18 @@ class CollisionModel:
 
     def free(self, q: ArrayLike) -> BoolArray:
         """Whether each ``q (..., n)`` keeps everything farther apart than the clearance."""
-        free: BoolArray = self.hits(q) < 0
-        return free
+        rows, shape = self._rows(q)
+        blocked = np.zeros(len(rows), np.int64)
+        lanes, margin = self.lanes, self.clearance
+        if len(rows):
+            if np.abs(rows).max(initial=0.0) > WHOLE_TURNS:
+                return np.asarray(self.hits(q) < 0)
+            over_ranges(lambda a, b: sphere.check_lanes(lanes, rows, margin, a, b, blocked), len(rows), LANE_GRAIN)
+        if not lanes.decides[0]:
+            open_rows = np.flatnonzero(blocked)
+            if len(open_rows):
+                blocked[open_rows] = self.hits(rows[open_rows]) >= 0
+        return np.asarray(blocked.reshape(shape) == 0)
 
     def edges_free(self, qa: ArrayLike, qb: ArrayLike, step: float | None = None) -> BoolArray:
         """Whether each straight motion ``qa → qb (..., n)`` is free, between the ends, too.
@@ -300,13 +329,29 @@ class CollisionModel:
         was found there, or than *step* in m (default: the model's resolution) where that is more. Nothing can be
         tunnelled: what goes unseen is nearer than the clearance by less than *step*.
         """
-        return np.asarray(self.edge_hits(qa, qb, step)[0] < 0)
+        step = self._step(step)
+        a, b = np.broadcast_arrays(as_shaped(qa, "qa", self.robot.n), as_shaped(qb, "qb", self.robot.n))
+        rows_a, shape = self._rows(a, "qa")
+        rows_b, _ = self._rows(b, "qb")
+        blocked = np.zeros(len(rows_a), np.int64)
+        lanes, exact, margin = self.lanes, self.compiled, self.clearance
 
-    def edge_hits(self, qa: ArrayLike, qb: ArrayLike, step: float | None = None) -> tuple[IntArray, Array]:
-        """As `edges_free`: the number of the pair of shapes that is hit (−1: free), and where (0 … 1)."""
+        def work(start: int, stop: int) -> None:
+            collide_edges.edges(exact, lanes, rows_a, rows_b, NONE, margin, step, start, stop, blocked)
+
+        if len(rows_a):
+            over_ranges(work, len(rows_a), 1)
+        return np.asarray(blocked.reshape(shape) == 0)
+
+    def _step(self, step: float | None) -> float:
         step = self.resolution if step is None else step
         if not (math.isfinite(step) and step > 0.0):
             raise InputError(f"step is {step}; expected a positive length in m")
+        return float(step)
+
+    def edge_hits(self, qa: ArrayLike, qb: ArrayLike, step: float | None = None) -> tuple[IntArray, Array]:
+        """As `edges_free`: the number of the pair of shapes that is hit (−1: free), and where (0 … 1)."""
+        step = self._step(step)
         a, b = np.broadcast_arrays(as_shaped(qa, "qa", self.robot.n), as_shaped(qb, "qb", self.robot.n))
         rows_a, shape = self._rows(a, "qa")
         rows_b, _ = self._rows(b, "qb")
@@ -314,7 +359,7 @@ class CollisionModel:
         model, margin = self.compiled, self.clearance
 
         def work(start: int, stop: int) -> None:
-            collide.edges_many(model, rows_a, rows_b, NONE, margin, step, start, stop, out, where)
+            collide_edges.edge_hits(model, rows_a, rows_b, margin, step, start, stop, out, where)
 
         if len(rows_a):
             over_ranges(work, len(rows_a), 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,11 +37,13 @@ def pair(a: str, b: str) -> Pair:
     return frozenset((a, b))
 
 
-def link_nodes(robot: Robot) -> tuple[Node, ...]:
-    """The links that have collision geometry."""
+def link_nodes(robot: Robot, geometry: Mapping[str, Sequence[Convex]] | None = None) -> tuple[Node, ...]:
+    """The links that have collision geometry: their description's, or what *geometry* gives instead."""
     tree, nodes = robot.model, []
+    for name in geometry or ():
+        robot.frame_index(name)
     for f, name in enumerate(robot.frame_names):
-        shapes = link_shapes(robot.description.links[name])
+        shapes = link_shapes(robot.description.links[name]) if geometry is None else tuple(geometry.get(name, ()))
         if shapes:
             place = matrix(tree.frame_place[f])
             nodes.append(Node(name, int(tree.frame_joint[f]), tuple(shape.at(place) for shape in shapes)))

@@ -45,6 +45,7 @@ import numpy as np
 from ..arrays import Array
 from ..conventions import DEGREE, GRAVITY
 from ..errors import ApprehendError, DescriptionError, suggestion
+from ..files import replace_file
 from .scene import Box, Placed, RobotSource, Scene
 from .tabletop import resting
 
@@ -383,9 +384,8 @@ def save(scene: Scene, path: Path) -> Path:
         lines += ["", "[task]", f"pick = {_quoted(scene.pick)}", f"upright = {str(scene.upright).lower()}"]
         if scene.pick in scene.goals:
             lines.append(f"place = {_pose_text(scene.goals[scene.pick])}")
-    temporary = path.with_name(path.name + ".partial")
-    temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    temporary.replace(path)
+    with replace_file(path) as work:
+        work.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
 
 

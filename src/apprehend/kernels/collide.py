@@ -19,7 +19,6 @@ from .collide_pairs import report
 from .gjk import AXIS, REL, ROWS, compose, gjk, relative
 from .gjk_depth import depth_scratch, signed_distance
 
-QUEUE = 4096
 CENTRE = 12  # columns of a placed shape: pose, centre of the bounding sphere, whether the pose is up to date
 DONE = 15
 
@@ -235,8 +234,6 @@ def covered(model, space, rate, margin, resolution, wanted):
     radius = wanted
     for block in range(blocks.shape[0]):
         speed = rate[block]
-        if speed == 0.0 and wanted < 1.0:
-            continue  # nothing moves here: settled by the first configuration
         need = margin + radius * speed
         if node_gap(nodes, balls, blocks[block, 0], blocks[block, 1]) > need:
             continue
@@ -251,81 +248,6 @@ def covered(model, space, rate, margin, resolution, wanted):
                 radius = min(radius, max(lower - margin, resolution) / speed)
                 need = margin + radius * speed
     return radius
-
-
-@kernel
-def edge_hit(model, qa, qb, margin, resolution, space, rate, queue):
-    """Whether the straight motion ``qa → qb`` is free: −1, or the pair that is hit and where: ``(pair, s)``.
-
-    Configurations are checked from the middle outwards; each covers the part of the motion around it in which no pair
-    can lose more than its distance to *margin*, or *resolution* if that is more.
-    """
-    n = qa.shape[0]
-    block_rates(model, qa, qb, rate)
-    q = queue[QUEUE, :n]
-    low, high = 0.0, 1.0
-    for end in range(2):  # the ends first: they also settle what does not move at all
-        for j in range(n):
-            q[j] = qa[j] if end == 0 else qb[j]
-        place(model, q, space)
-        radius = covered(model, space, rate, margin, resolution, 1.0)
-        if radius < 0.0:
-            return int(-1.0 - radius), float(end)
-        if radius >= 1.0:
-            return -1, 0.0
-        if end == 0:
-            low = radius
-        else:
-            high = 1.0 - radius
-    head, count = 0, 0
-    if low < high:
-        queue[0, 0], queue[0, 1] = low, high
-        count = 1
-    while count > 0:
-        if count < QUEUE - 128:
-            k = head
-            head = (head + 1) % QUEUE
-        else:
-            k = (head + count - 1) % QUEUE
-        count -= 1
-        low, high = queue[k, 0], queue[k, 1]
-        middle = 0.5 * (low + high)
-        for j in range(n):
-            q[j] = qa[j] + middle * (qb[j] - qa[j])
-        place(model, q, space)
-        radius = covered(model, space, rate, margin, resolution, 0.5 * (high - low) + 1e-12)
-        if radius < 0.0:
-            return int(-1.0 - radius), middle
-        if middle - radius > low:
-            k = (head + count) % QUEUE
-            queue[k, 0], queue[k, 1] = low, middle - radius
-            count += 1
-        if middle + radius < high:
-            k = (head + count) % QUEUE
-            queue[k, 0], queue[k, 1] = middle + radius, high
-            count += 1
-    return -1, 0.0
-
-
-@kernel
-def edge_scratch(model, n):
-    """Scratch ``rate`` and ``queue`` of `edge_hit` (the last row of the queue holds a configuration)."""
-    return np.empty(model.blocks.shape[0]), np.empty((QUEUE + 1, max(n, 2)))
-
-
-@kernel
-def edges_many(model, qa, qb, order, margin, resolution, start, stop, out, where):
-    """``out[i]`` = pair hit on the straight motion ``qa[i] → qb[i]``, at ``where[i]`` in 0 … 1; −1: free.
-
-    With *order*, stop at the first free motion in that order.
-    """
-    space = make_space(model)
-    rate, queue = edge_scratch(model, qa.shape[1])
-    for k in range(start, stop):
-        i = order[k] if order.shape[0] else k
-        out[i], where[i] = edge_hit(model, qa[i], qb[i], margin, resolution, space, rate, queue)
-        if order.shape[0] and out[i] < 0:
-            return
 
 
 @kernel

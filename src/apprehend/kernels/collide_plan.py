@@ -1,7 +1,7 @@
 """Two trees that grow towards each other through the free configurations (RRT-Connect), and shorter ways along a path.
 
 Kuffner & LaValle 2000, *RRT-Connect*. Random numbers come in from the caller, so that the same generator gives the
-same path. A tree is ``nodes (C, n)`` with ``parent (C,)`` (−1: a root); ``count`` (2,) says how many are filled.
+same path. The trees are ``nodes (2, C, n)`` with ``parent (2, C)`` (−1: a root), filled up to ``count (2,)``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ._jit import kernel
-from .collide import edge_hit, edge_scratch, make_space
+from .collide_edges import edge_blocked, edge_space
 
 CONNECTED = 1
 FULL = 2
@@ -34,7 +34,7 @@ def nearest_node(nodes, count, q):
 
 
 @kernel
-def extend(model, nodes, parent, count, q, stride, margin, resolution, space, rate, queue, greedy):
+def extend(exact, lanes, nodes, parent, count, q, stride, greedy, margin, resolution, space):
     """Grow a tree towards *q* by steps of at most *stride*: one, or (*greedy*) as many as are free.
 
     Returns ``(new count, reached)``.
@@ -42,16 +42,10 @@ def extend(model, nodes, parent, count, q, stride, margin, resolution, space, ra
     n = q.shape[0]
     row, left = nearest_node(nodes, count, q)
     while count < nodes.shape[0]:
-        if left == 0.0:  # there already: once more, so that the last node is the one reached
-            for j in range(n):
-                nodes[count, j] = q[j]
-            parent[count] = row
-            return count + 1, True
-        share = min(1.0, stride / left)
+        share = 1.0 if left <= stride else stride / left
         for j in range(n):
             nodes[count, j] = q[j] if share == 1.0 else nodes[row, j] + share * (q[j] - nodes[row, j])
-        hit, _ = edge_hit(model, nodes[row], nodes[count], margin, resolution, space, rate, queue)
-        if hit >= 0:
+        if left > 0.0 and edge_blocked(exact, lanes, nodes[row], nodes[count], margin, resolution, space):
             return count, False
         parent[count] = row
         row = count
@@ -65,61 +59,28 @@ def extend(model, nodes, parent, count, q, stride, margin, resolution, space, ra
 
 
 @kernel
-def grow(model, nodes_a, parent_a, nodes_b, parent_b, count, samples, turn, stride, margin, resolution):
+def grow(exact, lanes, nodes, parent, count, samples, turn, stride, margin, resolution):
     """Grow both trees with the configurations of ``samples (S, n)``; *turn* says which tree is first.
 
     Returns ``(status, samples used)``; when connected, the last node of each tree is the same configuration.
     """
-    space = make_space(model)
-    rate, queue = edge_scratch(model, samples.shape[1])
+    space = edge_space(exact, lanes, samples.shape[1])
     for s in range(samples.shape[0]):
-        first = (turn + s) % 2 == 0
-        before = count[0] if first else count[1]
-        if first:
-            count[0], _ = extend(
-                model, nodes_a, parent_a, count[0], samples[s], stride, margin, resolution, space, rate, queue, False
+        one = (turn + s) % 2
+        for step in range(2):
+            # first one tree a step towards the sample, then the other as far as it gets towards the new node
+            tree = one if step == 0 else 1 - one
+            target = samples[s] if step == 0 else nodes[one, count[one] - 1]
+            before = count[tree]
+            count[tree], reached = extend(
+                exact, lanes, nodes[tree], parent[tree], before, target, stride, step == 1, margin, resolution, space
             )
-            after = count[0]
-        else:
-            count[1], _ = extend(
-                model, nodes_b, parent_b, count[1], samples[s], stride, margin, resolution, space, rate, queue, False
-            )
-            after = count[1]
-        if after > before:
-            if first:
-                count[1], reached = extend(
-                    model,
-                    nodes_b,
-                    parent_b,
-                    count[1],
-                    nodes_a[after - 1],
-                    stride,
-                    margin,
-                    resolution,
-                    space,
-                    rate,
-                    queue,
-                    True,
-                )
-            else:
-                count[0], reached = extend(
-                    model,
-                    nodes_a,
-                    parent_a,
-                    count[0],
-                    nodes_b[after - 1],
-                    stride,
-                    margin,
-                    resolution,
-                    space,
-                    rate,
-                    queue,
-                    True,
-                )
-            if reached:
+            if step == 1 and reached:
                 return CONNECTED, s + 1
-        if count[0] >= nodes_a.shape[0] or count[1] >= nodes_b.shape[0]:
-            return FULL, s + 1
+            if count[tree] >= nodes.shape[1]:
+                return FULL, s + 1
+            if count[tree] == before:
+                break
     return MORE, samples.shape[0]
 
 
@@ -151,15 +112,14 @@ def point_at(path, count, s, out):
 
 
 @kernel
-def skip_vertices(model, path, count, margin, resolution, space, rate, queue):
+def skip_vertices(exact, lanes, path, count, margin, resolution, space):
     """Drop vertices that a straight motion can pass by, the farthest leaps first; returns the new count."""
     n = path.shape[1]
     i = 0
     while i < count - 2:
         k = count - 1
         while k > i + 1:
-            hit, _ = edge_hit(model, path[i], path[k], margin, resolution, space, rate, queue)
-            if hit < 0:
+            if not edge_blocked(exact, lanes, path[i], path[k], margin, resolution, space):
                 break
             k -= 1
         gap = k - i - 1
@@ -173,16 +133,15 @@ def skip_vertices(model, path, count, margin, resolution, space, rate, queue):
 
 
 @kernel
-def shortcut(model, path, count, samples, margin, resolution):
+def shortcut(exact, lanes, path, count, samples, margin, resolution):
     """Shorten ``path (C, n)`` of *count* vertices in place with pairs of random places ``samples (S, 2)`` in 0 … 1.
 
     Vertices that can be passed by go first; then straight motions between two random places on the path replace what
     lies between where they are free and shorter (Geraerts & Overmars 2007). Returns the new count.
     """
     n = path.shape[1]
-    space = make_space(model)
-    rate, queue = edge_scratch(model, n)
-    count = skip_vertices(model, path, count, margin, resolution, space, rate, queue)
+    space = edge_space(exact, lanes, n)
+    count = skip_vertices(exact, lanes, path, count, margin, resolution, space)
     a, b = np.empty(n), np.empty(n)
     rest = np.empty_like(path)
     for s in range(samples.shape[0]):
@@ -200,8 +159,7 @@ def shortcut(model, path, count, samples, margin, resolution):
             d += (b[j] - a[j]) ** 2
         if math.sqrt(d) > (high - low) * (1.0 - 1e-3):
             continue
-        hit, _ = edge_hit(model, a, b, margin, resolution, space, rate, queue)
-        if hit >= 0:
+        if edge_blocked(exact, lanes, a, b, margin, resolution, space):
             continue
         # vertices 0 … i, a, b, k + 1 … end
         tail = count - (k + 1)
@@ -215,4 +173,4 @@ def shortcut(model, path, count, samples, margin, resolution):
             for j in range(n):
                 path[i + 3 + r, j] = rest[r, j]
         count = i + 3 + tail
-    return skip_vertices(model, path, count, margin, resolution, space, rate, queue)
+    return skip_vertices(exact, lanes, path, count, margin, resolution, space)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, BoolArray, IntArray, as_shaped
 from ..collision import CollisionModel, Touch
 from ..errors import InputError
-from ..kernels import collide, collide_plan
+from ..kernels import collide_edges, collide_plan
 from ..kinematics import Robot
 from .result import PlanResult, PlanStatus
 
@@ -74,8 +74,8 @@ def plan(
     q0 = np.clip(q0, lower, upper)
     if not len(targets):
         return answer(PlanStatus.NO_GOAL)
-    touches = model.why(q0)
-    if touches:
+    if not model.free(q0):
+        touches = model.why(q0)
         return answer(PlanStatus.START_IN_COLLISION, detail=f"{'; '.join(map(str, touches[:3]))}.", touches=touches)
 
     turning = moving & np.isneginf(lower) & np.isposinf(upper)
@@ -122,11 +122,10 @@ def plan(
 def first_direct(model: CollisionModel, start: Array, goals: Array, order: IntArray) -> int:
     """The first of *goals* in *order* that a straight motion reaches, or −1."""
     starts = np.repeat(start[None], len(goals), axis=0)
-    hit, where = np.zeros(len(goals), np.int64), np.zeros(len(goals))
-    collide.edges_many(
-        model.compiled, starts, goals, order, model.clearance, model.resolution, 0, len(order), hit, where
-    )
-    free = order[hit[order] < 0]
+    blocked = np.ones(len(goals), np.int64)
+    limits = model.clearance, model.resolution
+    collide_edges.edges(model.compiled, model.lanes, starts, goals, order, *limits, 0, len(order), blocked)
+    free = order[blocked[order] == 0]
     return int(free[0]) if len(free) else -1
 
 
@@ -136,11 +135,11 @@ class Search:
     def __init__(self, model: CollisionModel, start: Array, goals: Array, max_nodes: int):
         self.model = model
         room = max(max_nodes, len(goals) + 1)
-        self.nodes = [np.zeros((room, len(start))), np.zeros((room, len(start)))]
-        self.parent = [np.full(room, -1, np.int64), np.full(room, -1, np.int64)]
+        self.nodes = np.zeros((2, room, len(start)))
+        self.parent = np.full((2, room), -1, np.int64)
         self.count = np.array([1, len(goals)], np.int64)
-        self.nodes[0][0] = start
-        self.nodes[1][: len(goals)] = goals
+        self.nodes[0, 0] = start
+        self.nodes[1, : len(goals)] = goals
         self.samples = 0
         self.chunk = 16
 
@@ -148,8 +147,8 @@ class Search:
         """Try one more portion of random configurations."""
         samples = rng.uniform(lower, upper, (self.chunk, len(lower)))
         status, used = collide_plan.grow(
-            self.model.compiled,
-            self.nodes[0], self.parent[0], self.nodes[1], self.parent[1], self.count,
+            self.model.compiled, self.model.lanes,
+            self.nodes, self.parent, self.count,
             samples, self.samples % 2, STRIDE, self.model.clearance, self.model.resolution,
         )  # fmt: skip
         self.samples += int(used)
@@ -165,8 +164,8 @@ class Search:
             while row >= 0:
                 rows.append(row)
                 root = row
-                row = int(self.parent[k][row])
-            halves.append(self.nodes[k][rows])
+                row = int(self.parent[k, row])
+            halves.append(self.nodes[k, rows])
         return np.concatenate([halves[0][::-1], halves[1][1:]]), root
 
 
@@ -180,7 +179,9 @@ def shortcut(model: CollisionModel, path: ArrayLike, *, rng: np.random.Generator
     room = np.zeros((len(points) + 2 * tries + 2, model.robot.n))
     room[: len(points)] = points
     pairs = rng.uniform(size=(tries, 2))
-    count = collide_plan.shortcut(model.compiled, room, len(points), pairs, model.clearance, model.resolution)
+    count = collide_plan.shortcut(
+        model.compiled, model.lanes, room, len(points), pairs, model.clearance, model.resolution
+    )
     return room[:count].copy()
 
 
