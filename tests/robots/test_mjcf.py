@@ -89,7 +89,7 @@ def test_a_hand_equals_the_compiled_model(tmp_path: Path) -> None:
     mimic = d.joint("a3").mimic
     assert mimic is not None
     assert (mimic.joint, mimic.multiplier, mimic.offset) == ("a1", 0.5, 0.1)
-    assert d.home == {"a1": 0.1, "a2": 0.2, "a3": 0.15, "s": 0.01}
+    assert d.home == {"a1": 0.1, "a2": 0.2, "s": 0.01}
     assert d.allowed_collisions == {frozenset(("palm", "f2"))}
 
 

@@ -24,9 +24,11 @@ from .description import (
 )
 from .dh import DHTable
 from .dh_derive import dh_table
+from .export import save_dh, save_mjcf, save_urdf
 from .load import load_description
 from .meshes import link_surface, load_shape_mesh, read_mesh, shape_surface
 from .mjcf import read_mjcf
+from .outline import outline
 from .srdf import Semantics, read_srdf
 from .table_files import read_dh, read_table
 from .urdf import parse_urdf, read_urdf
@@ -53,6 +55,7 @@ __all__ = [
     "link_surface",
     "load_description",
     "load_shape_mesh",
+    "outline",
     "parse_urdf",
     "read_dh",
     "read_mesh",
@@ -61,6 +64,9 @@ __all__ = [
     "read_table",
     "read_urdf",
     "renamed",
+    "save_dh",
+    "save_mjcf",
+    "save_urdf",
     "shape_surface",
     "subtree",
     "without",

@@ -35,7 +35,7 @@ def load_description(
     *packages* are the folders of mesh names; *meshes* is ``"require"`` or ``"ignore"`` for missing mesh files;
     *inertias* is ``"repair"``, ``"keep"`` or ``"refuse"`` for values that no body can have; *loops* is ``"refuse"`` or
     ``"cut"`` for closed chains. An SRDF beside a URDF (same stem, or ``../srdf``) adds the pairs of links that may
-    touch.
+    touch, and the posture named "home".
     """
     text = str(name_or_path)
     path = Path(name_or_path)
@@ -91,9 +91,12 @@ def read_file(path: Path, options: Options) -> Description:
 
 
 def _with_srdf(description: Description) -> Description:
-    """*description* with the pairs that an SRDF beside its file allows to touch."""
+    """*description* with what an SRDF beside its file adds: pairs that may touch, and the posture named home."""
     srdf = beside(description)
     if srdf is None:
         return description
-    allowed = allowed_within(read_srdf(srdf), description)
-    return replace(description, allowed_collisions=description.allowed_collisions | allowed)
+    semantics = read_srdf(srdf)
+    joints = {j.name for j in description.joints}
+    home = {n: v for n, v in semantics.postures.get("home", {}).items() if n in joints}
+    allowed = description.allowed_collisions | allowed_within(semantics, description)
+    return replace(description, home=home, allowed_collisions=allowed)

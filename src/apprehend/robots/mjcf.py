@@ -33,6 +33,7 @@ from .description import (
     Repair,
     Tendon,
 )
+from .export_mjcf import UNLIMITED
 from .mjcf_files import check_files
 from .mjcf_shapes import body_shapes
 from .paths import MeshPaths, Packages
@@ -168,7 +169,7 @@ class _Compiled:
         axis = m.jnt_axis[k] / np.linalg.norm(m.jnt_axis[k])
         reference = float(m.qpos0[m.jnt_qposadr[k]])
         limited = bool(m.jnt_limited[k])
-        lower, upper = (float(x) for x in m.jnt_range[k]) if limited else (-math.inf, math.inf)
+        lower, upper = _range(m.jnt_range[k], limited)
         if kind == types.mjJNT_SLIDE:
             type_ = JointType.PRISMATIC
             back = shift(-reference * axis)
@@ -304,7 +305,7 @@ class _Compiled:
                     f"tendon {name!r}", "runs through space, so that its arms change with the posture", "left it out"
                 )
                 continue
-            lower, upper = (float(x) for x in m.tendon_range[t]) if m.tendon_limited[t] else (-math.inf, math.inf)
+            lower, upper = _range(m.tendon_range[t], m.tendon_limited[t])
             found.append(Tendon(name, arms, lower, upper))
         return tuple(found)
 
@@ -336,7 +337,7 @@ class _Compiled:
     def _force_range(self, u: int) -> tuple[float, float]:
         m = self.m
         if m.actuator_forcelimited[u]:
-            return float(m.actuator_forcerange[u, 0]), float(m.actuator_forcerange[u, 1])
+            return _range(m.actuator_forcerange[u])
         direct = (
             int(m.actuator_gaintype[u]) == int(self.mj.mjtGain.mjGAIN_FIXED)
             and int(m.actuator_biastype[u]) == int(self.mj.mjtBias.mjBIAS_NONE)
@@ -357,8 +358,9 @@ class _Compiled:
         elif len(names) == 1:
             q = m.key_qpos[0]
         home = {}
+        free = {j.name for j in self.joints if j.mimic is None and j.type is not JointType.FIXED}
         for k, ours in self.coordinates.items():
-            if len(ours) == 1:
+            if len(ours) == 1 and ours[0] in free:
                 value = float(q[m.jnt_qposadr[k]])
                 if m.nkey or value:
                     home[ours[0]] = value
@@ -369,3 +371,11 @@ class _Compiled:
         for signature in self.m.exclude_signature:
             pairs.add(frozenset((self.body[int(signature) >> 16], self.body[int(signature) & 0xFFFF])))
         return frozenset(p for p in pairs if len(p) == 2)
+
+
+def _range(ends: Array, limited: bool = True) -> tuple[float, float]:
+    """The two ends of a range; what is as large as `UNLIMITED`, or not *limited*, is infinite."""
+    lower, upper = (float(end) for end in ends)
+    if not limited:
+        return -math.inf, math.inf
+    return (-math.inf if lower <= -UNLIMITED else lower), (math.inf if upper >= UNLIMITED else upper)

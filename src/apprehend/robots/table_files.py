@@ -172,7 +172,9 @@ class _Table:
         for key in _LIMITS:
             if key in row:
                 scale = 1.0 if key == "effort" else unit
-                given[key] = scale * self.number(row[key], f"joint {name!r}: {key}")
+                value = row[key]
+                endless = isinstance(value, float) and math.isinf(value)
+                given[key] = value if endless else scale * self.number(value, f"joint {name!r}: {key}")
         limits = JointLimits(**given)
         check_limits(limits, name, str(self.path))
         return name, type_, limits

@@ -38,6 +38,8 @@ from .tree import check_limits, ordered, resolved_mimics
 from .urdf_extras import actuators, filter_groups
 
 Rgba = tuple[float, float, float, float]
+HUGE = 1e300
+"""A limit beyond this is an infinite one: the format wants a number where there is none."""
 _JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
 
 
@@ -343,7 +345,8 @@ class _Reader:
                            "took both as 0, as the format says: the joint cannot move")  # fmt: skip
             lower = doc.number(element, "lower", what, 0.0)
             upper = doc.number(element, "upper", what, 0.0)
-        limits = JointLimits(lower, upper, **given)
+        given |= {"lower": lower, "upper": upper}
+        limits = JointLimits(**{k: math.copysign(math.inf, v) if abs(v) > HUGE else v for k, v in given.items()})
         check_limits(limits, name, f"{doc.source}:{element.sourceline}")
         return limits
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..errors import suggestion
-from .description import Actuator, Joint, Link
+from .description import Actuator, Joint, JointType, Link
 from .markup import Document, local, plain_children, prefixed
 
 
 def actuators(doc: Document, joints: Mapping[str, Joint]) -> tuple[Actuator, ...]:
     """One motor for each actuator of a ``<transmission>``: its arm is the mechanical reduction."""
-    found = []
+    found: list[Actuator] = []
     for element in plain_children(doc.root, "transmission"):
         what = f"transmission {element.get('name')!r}"
         names = [doc.attribute(e, "name", what) for e in plain_children(element, "joint")]
@@ -20,9 +20,9 @@ def actuators(doc: Document, joints: Mapping[str, Joint]) -> tuple[Actuator, ...
             if names or motors:
                 doc.repair(element, f"{what} has {len(names)} joints and {len(motors)} actuators", "left it out")
             continue
-        if names[0] not in joints:
-            hint = suggestion(names[0], joints)
-            doc.repair(element, f"{what} drives the joint {names[0]!r}, which does not exist.{hint}", "left it out")
+        if names[0] not in joints or joints[names[0]].type is JointType.FIXED:
+            why = "is fixed" if names[0] in joints else f"does not exist.{suggestion(names[0], joints)}"
+            doc.repair(element, f"{what} drives the joint {names[0]!r}, which {why}", "left it out")
             continue
         ratio = 1.0
         for holder in (element, motors[0]):
@@ -33,7 +33,11 @@ def actuators(doc: Document, joints: Mapping[str, Joint]) -> tuple[Actuator, ...
                     doc.fail(at, f"{what}: mechanicalReduction is {at.text!r}; expected a number")
         if ratio == 0.0:
             doc.fail(element, f"{what}: mechanicalReduction is 0; expected the ratio of motor to joint turns")
-        found.append(Actuator(str(motors[0].get("name") or element.get("name")), {names[0]: ratio}))
+        name = str(motors[0].get("name") or element.get("name"))
+        if any(name == other.name for other in found):
+            doc.repair(element, f"a second actuator is named {name!r}", f"called it {name}_{names[0]}")
+            name = f"{name}_{names[0]}"
+        found.append(Actuator(name, {names[0]: ratio}))
     return tuple(found)
 
 
