@@ -37,9 +37,8 @@ class Page:
         logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # browsers open sockets and drop them
         with redirect_stdout(io.StringIO()):  # the server prints a banner; `serve` announces instead
             self.server = viser.ViserServer(host=host, port=_free_port(host, port), label=title, verbose=False)
-        self.server.gui.configure_theme(
-            control_layout="collapsible", control_width="large", show_logo=False, show_share_button=False
-        )
+        self.server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+        self.server.gui.main_panel.dock_right()
         self.server.gui.set_panel_label(title)
         scene = self.server.scene
         scene.set_up_direction("+z")
@@ -52,6 +51,7 @@ class Page:
         self.handles: dict[str, Any] = {}
         """The meshes on the page by their names."""
         self._stopped = threading.Event()
+        self._worker: threading.Thread | None = None
 
     @property
     def link_names(self) -> tuple[str, ...]:
@@ -145,6 +145,16 @@ class Page:
                 self.stop()
         return self
 
+    def every(self, seconds: float, work: Callable[[], object]) -> None:
+        """Call *work* again and again, about every so many *seconds*, until the page ends."""
+
+        def run() -> None:
+            while not self._stopped.wait(seconds):
+                work()
+
+        self._worker = threading.Thread(target=run, name="apprehend-page", daemon=True)
+        self._worker.start()
+
     @property
     def stopped(self) -> bool:
         """Whether `stop` was called."""
@@ -154,6 +164,8 @@ class Page:
         """End the page."""
         if not self._stopped.is_set():
             self._stopped.set()
+            if self._worker is not None and self._worker is not threading.current_thread():
+                self._worker.join()
             with redirect_stdout(io.StringIO()):
                 self.server.stop()
 

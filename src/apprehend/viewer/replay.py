@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -75,7 +74,8 @@ class Player:
         self._build(data)
         self._marks(stage, data)
         self.go(0.0)
-        threading.Thread(target=self._run, name="apprehend-replay", daemon=True).start()
+        self._before = time.perf_counter()
+        page.every(1.0 / FRAME_RATE, self._advance)
 
     def go(self, seconds: float) -> None:
         """Show the state at a time of the recording."""
@@ -156,19 +156,17 @@ class Player:
         if self._moving and self.slider.value >= self.record.time[-1] - 0.02:
             self.slider.value = 0.0
 
-    def _run(self) -> None:
-        before = time.perf_counter()
-        while not self.page.stopped:
-            time.sleep(1.0 / FRAME_RATE)
-            now = time.perf_counter()
-            if self._moving:
-                seconds = self.slider.value + (now - before) * SPEEDS[self.speed.value]
-                if seconds >= float(self.record.time[-1]):
-                    seconds = float(self.record.time[-1])
-                    self._toggle()
-                self.slider.value = min(seconds, self.slider.max)
-                self.go(seconds)
-            before = now
+    def _advance(self) -> None:
+        now = time.perf_counter()
+        elapsed, self._before = now - self._before, now
+        if not self._moving:
+            return
+        end = float(self.record.time[-1])
+        seconds = min(self.slider.value + elapsed * SPEEDS[self.speed.value], end)
+        if seconds == end:
+            self._toggle()
+        self.slider.value = min(seconds, self.slider.max)
+        self.go(seconds)
 
 
 def switch(gui: Any, label: str, handles: list[Any], *, shown: bool = True) -> None:
