@@ -82,3 +82,47 @@ def configurations(robot: Robot, count: int, seed: int = 0) -> np.ndarray:
     return rng.uniform(
         np.where(np.isfinite(lower), lower, -np.pi), np.where(np.isfinite(upper), upper, np.pi), (count, robot.n)
     )
+
+
+def from_axes(
+    H: np.ndarray, P: np.ndarray, R0: np.ndarray | None = None, kinds: str | None = None, limit: float = np.pi
+) -> Robot:
+    """The robot p = P0 + R1 (P1 + R2 (P2 + …)) with axes ``H (m, 3)``, offsets ``P (m + 1, 3)``, turning by ±limit."""
+    m = len(H)
+    kinds = kinds or "R" * m
+    links = ["base", *(f"link{i}" for i in range(m)), "tip"]
+    joints = []
+    for i in range(m):
+        T = np.eye(4)
+        T[:3, 3] = P[i]
+        limits = JointLimits(-limit, limit)
+        joints.append(Joint(f"j{i}", TYPES[kinds[i]], links[i], links[i + 1], T, np.asarray(H[i], float), limits))
+    T = np.eye(4)
+    T[:3, 3] = P[m]
+    T[:3, :3] = np.eye(3) if R0 is None else R0
+    joints.append(Joint("to_tip", JointType.FIXED, links[m], "tip", T))
+    return Robot(Description("axes", "base", {name: Link(name) for name in links}, tuple(joints)))
+
+
+def from_dh(links: list[dict[str, float]]) -> Robot:
+    """A robot from rows of standard Denavit–Hartenberg parameters: A = Rz(θ + offset) Tz(d) Tx(a) Rx(α)."""
+    names = ["base", *(f"link{i}" for i in range(len(links)))]
+    joints = []
+    T = np.eye(4)
+    for i, row in enumerate(links):
+        c, s = np.cos(row["offset"]), np.sin(row["offset"])
+        joints.append(
+            Joint(
+                f"j{i}",
+                JointType.REVOLUTE,
+                names[i],
+                names[i + 1],
+                T @ np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]),
+                limits=JointLimits(-np.pi, np.pi),
+            )
+        )
+        c, s = np.cos(row["alpha"]), np.sin(row["alpha"])
+        T = np.array([[1, 0, 0, row["a"]], [0, c, -s, 0], [0, s, c, row["d"]], [0, 0, 0, 1.0]])
+    joints.append(Joint("to_tip", JointType.FIXED, names[-1], "tip", T))
+    names.append("tip")
+    return Robot(Description("dh", "base", {name: Link(name) for name in names}, tuple(joints)))

@@ -1,5 +1,6 @@
 """Inverse kinematics: solved, or why not (G 1.8)."""
 
+from .branches import BranchResult, BranchStatus, branches, redundancy_intervals, redundant_joint
 from .result import IKResult, IKStatus
 from .solve import solve
 from .step import Stepper, TrackResult, TrackStatus, step, track
@@ -18,6 +19,8 @@ from .tasks import (
 )
 
 __all__ = [
+    "BranchResult",
+    "BranchStatus",
     "ComTask",
     "DescentTask",
     "DirectionTask",
@@ -34,6 +37,9 @@ __all__ = [
     "Task",
     "TrackResult",
     "TrackStatus",
+    "branches",
+    "redundancy_intervals",
+    "redundant_joint",
     "solve",
     "step",
     "track",

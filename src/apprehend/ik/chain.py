@@ -14,7 +14,7 @@ from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..kernels.chain import PRISMATIC, ChainModel
 from ..kernels.ik_chain import IKChain
-from ..kernels.ik_seeds import chain_features
+from ..kernels.ik_seeds import chain_features, chain_targets
 from ..kinematics import Robot
 
 TABLE = 512
@@ -41,10 +41,9 @@ class PreparedChain:
 
     def targets(self, T: Array) -> Array:
         """Poses ``(N, 4, 4)`` in the world as the rows ``(N, 12)`` that the kernels read."""
-        R0 = self.before[:3, :3]
         out = np.empty((T.shape[0], 12))
-        out[:, :9] = np.matmul(R0.T, T[:, :3, :3] @ self.program.tool.T).reshape(-1, 9)
-        out[:, 9:] = (T[:, :3, 3] - self.before[:3, 3]) @ R0 / self.reach
+        rows = np.ascontiguousarray(T).reshape(-1, 16)
+        chain_targets(rows, self.before, self.program.tool, self.reach, 0, rows.shape[0], out)
         return out
 
     def to_kernel(self, q: Array) -> Array:

@@ -37,6 +37,24 @@ def chain_features(chain, q, out):
 
 
 @kernel
+def chain_targets(poses, before, tool, reach, first, last, out):
+    """Poses ``(N, 16)`` in the world as targets ``out (N, 12)`` of a chain: rotation (9), position (3) over the reach."""
+    for i in range(first, last):
+        T = poses[i]
+        for r in range(3):
+            x = y = z = p = 0.0
+            for k in range(3):
+                b = before[k, r]
+                x += b * T[4 * k]
+                y += b * T[4 * k + 1]
+                z += b * T[4 * k + 2]
+                p += b * (T[4 * k + 3] - before[k, 3])
+            for c in range(3):
+                out[i, 3 * r + c] = x * tool[c, 0] + y * tool[c, 1] + z * tool[c, 2]
+            out[i, 9 + r] = p / reach
+
+
+@kernel
 def nearest_starts(table, half, targets, first, last, order):
     """Best entry of every group for ``targets[first:last] (N, 12)``, nearest first, in ``order (N, groups)``.
 
