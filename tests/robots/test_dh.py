@@ -8,37 +8,30 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from apprehend.errors import DescriptionError, InputError, UnknownNameError
-from apprehend.kinematics import Robot
+from apprehend.errors import DescriptionError, InputError
+from apprehend.kinematics import Robot, dh_table
 from apprehend.robots import (
-    Description,
-    DHTable,
-    Joint,
+    DHChain,
     JointType,
-    Link,
     catalogue,
-    dh_table,
     load_description,
-    parse_urdf,
     read_dh,
     read_table,
 )
-from apprehend.robots.poses import from_rpy, motion
-from tests.robots.build import joint, link, robot, write
+from apprehend.robots.poses import from_rpy
+from tests.robots.build import write
 from tests.support import reference
 
 RNG = np.random.default_rng(3)
 
 
-def table_of(case: Any) -> DHTable:
+def table_of(case: Any) -> DHChain:
     links = case["links"]
     types = tuple(JointType.PRISMATIC if row["sigma"] else JointType.REVOLUTE for row in links)
     column = {key: np.array([row[key] for row in links]) for key in ("theta", "d", "a", "alpha", "offset")}
     slides = np.array([t is JointType.PRISMATIC for t in types])
-    return DHTable(
+    return DHChain(
         case["dh"], tuple(f"q{i}" for i in range(len(links))), types,
         column["theta"] + np.where(slides, 0.0, column["offset"]),
         column["d"] + np.where(slides, column["offset"], 0.0),
@@ -112,68 +105,31 @@ def test_panda_by_its_published_table_is_the_panda_by_urdf() -> None:
     assert np.array_equal(urdf.limits.acceleration, table.limits.acceleration)
 
 
-@pytest.mark.parametrize("convention", ["standard", "modified"])
-def test_inverse_transforms(convention: str) -> None:
-    table = dh_table(load_description("puma560"), convention=convention)
-    q = RNG.uniform(-3, 3, (4, 5, 6))
-    product = table.transforms(q) @ table.inverse_transforms(q)
-    assert product.shape == (4, 5, 6, 4, 4)
-    assert np.abs(product - np.eye(4)).max() < 1e-14
-
-
-# ---- derivation
+# ---- the table of a chain, written as a chain of its own
 
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 @pytest.mark.parametrize("name", [e.name for e in catalogue.entries().values() if e.installed and e.kind != "legged"])
 def test_every_chain_of_the_catalogue(name: str, convention: str) -> None:
-    description = load_description(name)
-    robot_ = Robot(description)
+    robot = Robot.load(name)
+    description = robot.description
     leaves = sorted(description.links.keys() - {j.parent for j in description.joints})
-    q = RNG.uniform(-1.5, 1.5, (3, robot_.n))
-    full = {n: q[:, i] for i, n in enumerate(robot_.joint_names)}
+    q = RNG.uniform(-1.5, 1.5, (3, robot.n))
+    full = {n: q[:, i] for i, n in enumerate(robot.joint_names)}
     for j in description.joints:
         if j.mimic:
             full[j.name] = j.mimic.multiplier * full[j.mimic.joint] + j.mimic.offset
     for leaf in leaves[:6]:
-        if not robot_.chain(leaf):
-            with pytest.raises(InputError, match="there is no DH table"):
-                dh_table(description, leaf, convention)
+        if not robot.chain(leaf):
             continue
-        table = dh_table(description, leaf, convention)
-        rows = np.stack([full[n] for n in table.names], axis=-1)
-        scale = 1.0 + np.abs(table.d).max()  # almost parallel axes meet far away
-        assert np.abs(table.fk(rows) - robot_.fk(q, leaf)).max() < 1e-13 * scale * 10
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.lists(st.tuples(*[st.floats(-2, 2)] * 6, st.sampled_from("rp"), st.integers(0, 2)), min_size=1, max_size=7))
-def test_any_chain(rows: list[Any]) -> None:
-    links, joints, parent = {"l0": Link("l0")}, [], "l0"
-    for i, (*pose, kind, axis) in enumerate(rows):
-        name = f"l{i + 1}"
-        type_ = JointType.PRISMATIC if kind == "p" else JointType.REVOLUTE
-        joints.append(Joint(f"j{i}", type_, parent, name, from_rpy(pose[:3], np.round(pose[3:], 1)), np.eye(3)[axis]))
-        links[name] = Link(name)
-        parent = name
-    description = Description("chain", "l0", links, tuple(joints))
-    q = np.linspace(-1, 1.3, len(rows))
-    T = np.eye(4)
-    for j, value in zip(joints, q, strict=True):
-        T = T @ j.pose @ motion(j, float(value))
-    for convention in ("standard", "modified"):
-        table = dh_table(description, parent, convention)
-        scale = 1.0 + np.abs(table.d).max()
-        assert np.abs(table.fk(q) - T).max() < 1e-12 * scale
-        assert (table.alpha >= -1e-12).all()  # x lies along z × z′, as the script has it
-        again = dh_table(table.description(), convention=convention)
-        assert np.abs(again.fk(q) - T).max() < 1e-12 * scale
-
-
-def test_a_dh_arm_gives_back_its_own_lengths() -> None:
-    table = dh_table(load_description("puma560"))
-    assert np.allclose(np.abs(table.a), [0, 0.4318, 0.0203, 0, 0, 0], atol=1e-12)
-    assert np.allclose(np.abs(table.d), [0.67183, 0, 0.15005, 0.4318, 0, 0], atol=1e-12)
+        table = dh_table(robot, leaf)
+        chain = (table if convention == "standard" else table.modified()).chain(robot)
+        rows = np.stack([full[n] for n in chain.names], axis=-1)
+        size = 1.0 + np.abs(chain.d).max()  # almost parallel axes meet far away
+        expected = robot.fk(q, leaf)
+        assert np.abs(chain.fk(rows) - expected).max() < 1e-12 * size
+        alone = Robot(chain.description())
+        assert np.abs(alone.fk(rows, alone.description.tool) - expected).max() < 1e-12 * size
 
 
 def test_a_table_prints_as_a_person_writes_it() -> None:
@@ -182,7 +138,8 @@ def test_a_table_prints_as_a_person_writes_it() -> None:
     assert "a [mm]" in text
     row = text.splitlines()[4].split()
     assert row == ["joint3", "revolute", "0", "90", "223.5", "90+q"]
-    assert "a(i−1) [mm]" in str(dh_table(load_description("puma560"), convention="modified"))
+    puma = Robot.load("puma560")
+    assert "a(i−1) [mm]" in str(dh_table(puma, "link6").modified().chain(puma))
 
 
 # ---- files
@@ -332,18 +289,9 @@ def test_mistakes_in_tables(tmp_path: Path, text: str, said: str) -> None:
     assert "t.toml" in str(caught.value)
 
 
-def test_mistakes_in_calls(tmp_path: Path) -> None:
-    hand = parse_urdf(robot(*(link(n) for n in "abc"), joint("i", "a", "b"), joint("j", "a", "c"), name="y"))
-    with pytest.raises(InputError, match="'y' has 2 chains; pass tip= one of b, c"):
-        dh_table(hand)
-    with pytest.raises(UnknownNameError, match="no link named 'd' in robot 'y'"):
-        dh_table(hand, "d")
-    with pytest.raises(InputError, match="no joint moves between the root of 'y' and its tip"):
-        dh_table(hand, "a")
-    with pytest.raises(InputError, match="convention is 'craig'; expected one of 'standard', 'modified'"):
-        dh_table(hand, "b", "craig")
+def test_mistakes_in_calls() -> None:
     with pytest.raises(InputError, match="alpha has 2 entries; expected 1, one for each joint"):
-        DHTable("standard", ("q",), (JointType.REVOLUTE,), np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(2))
+        DHChain("standard", ("q",), (JointType.REVOLUTE,), np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(2))
     with pytest.raises(InputError, match=r"q has shape \(5,\); expected \(\.\.\., 7\)"):
         read_dh(catalogue.entry("armar1").file()).fk(np.zeros(5))
     with pytest.raises(DescriptionError, match="kind is 'twists'; expected 'dh'"):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from apprehend.errors import InputError
-from apprehend.kinematics import Robot
+from apprehend.kinematics import Robot, dh_table
 from apprehend.robots import (
     Actuator,
     Description,
@@ -25,7 +25,6 @@ from apprehend.robots import (
     ShapeKind,
     Tendon,
     catalogue,
-    dh_table,
     load_description,
     load_shape_mesh,
     outline,
@@ -192,14 +191,15 @@ def test_meshes_that_mujoco_does_not_read_are_converted(tmp_path: Path) -> None:
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 @pytest.mark.parametrize("name", ["puma560", "ur5e", "stanford", "armar1"])
 def test_dh_round_trip(tmp_path: Path, name: str, convention: str) -> None:
-    table = dh_table(load_description(name), convention=convention)
+    robot = Robot.load(name)
+    derived = dh_table(robot, robot.description.tool)
+    table = (derived if convention == "standard" else derived.modified()).chain(robot)
     save_dh(table, tmp_path / "t.toml")
     again = read_dh(tmp_path / "t.toml")
     for field in ("theta", "d", "a", "alpha", "base", "tool"):
         assert np.array_equal(getattr(again, field), getattr(table, field))
-    assert (again.convention, again.names, again.types, again.limits, again.flip, again.name) == (
-        table.convention, table.names, table.types, table.limits, table.flip, table.name
-    )  # fmt: skip
+    for field in ("convention", "names", "types", "limits", "flip", "name", "home"):
+        assert getattr(again, field) == getattr(table, field)
 
 
 @pytest.mark.parametrize("pitch", [0.0, 1.0, np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-9, -np.pi / 2 + 1e-6])

@@ -13,39 +13,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, as_array, as_shaped, choice
+from ..arrays import Array, as_shaped
 from ..errors import InputError
 from ..kernels.chain import REVOLUTE
+from ..robots.description import JointLimits
+from ..robots.dh import DHChain, dh_transform, inverse_dh_transform
 from ..spatial import se3
 from .exponentials import ProductOfExponentials
+
+__all__ = ["DHRow", "DHTable", "dh_table", "dh_transform", "inverse_dh_transform"]
 
 if TYPE_CHECKING:
     from .robot import Robot
 
-CONVENTIONS = ("standard", "modified")
-
 PARALLEL = 1e-9
 """Axes whose directions differ by less (sine of the angle) count as parallel."""
-
-
-def dh_transform(theta: ArrayLike, d: ArrayLike, a: ArrayLike, alpha: ArrayLike, convention: str = "standard") -> Array:
-    """``A_{i−1,i} (..., 4, 4)`` of the four parameters, which broadcast (K DH-Transformationsmatrizen)."""
-    choice(convention, "convention", CONVENTIONS)
-    th, dd, aa, al = np.broadcast_arrays(*(as_array(v, n) for v, n in zip((theta, d, a, alpha), "θdaα", strict=True)))
-    c, s, ca, sa, zero, one = np.cos(th), np.sin(th), np.cos(al), np.sin(al), np.zeros_like(th), np.ones_like(th)
-    if convention == "standard":
-        rows = [[c, -s * ca, s * sa, aa * c], [s, c * ca, -c * sa, aa * s], [zero, sa, ca, dd]]
-    else:
-        rows = [[c, -s, zero, aa], [s * ca, c * ca, -sa, -dd * sa], [s * sa, c * sa, ca, dd * ca]]
-    rows.append([zero, zero, zero, one])
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def inverse_dh_transform(
-    theta: ArrayLike, d: ArrayLike, a: ArrayLike, alpha: ArrayLike, convention: str = "standard"
-) -> Array:
-    """``A_{i,i−1} = A_{i−1,i}⁻¹ (..., 4, 4)`` (K Inverse DH-Transformation)."""
-    return se3.inverse(dh_transform(theta, d, a, alpha, convention))
 
 
 @dataclass(frozen=True)
@@ -98,6 +80,28 @@ class DHTable:
         rows = tuple(replace(r, a=a[i], alpha=alpha[i]) for i, r in enumerate(self.rows))
         tool = dh_transform(0.0, 0.0, a[-1], alpha[-1]) @ self.tool
         return replace(self, convention="modified", rows=rows, tool=tool)
+
+    def chain(self, robot: Robot) -> DHChain:
+        """The table as a chain of its own, with the limits of *robot*, whose chain it is: for files (`save_dh`).
+
+        A mimicking joint becomes a joint without limits.
+        """
+        joints = [robot.description.joint(row.joint) for row in self.rows]
+        theta, d, a, alpha = np.array([[row.theta, row.d, row.a, row.alpha] for row in self.rows]).T
+        return DHChain(
+            self.convention,
+            tuple(row.joint for row in self.rows),
+            tuple(joint.type for joint in joints),
+            theta,
+            d,
+            a,
+            alpha,
+            base=self.base,
+            tool=self.tool,
+            limits=tuple(JointLimits() if joint.mimic else joint.limits for joint in joints),
+            name=self.robot,
+            home={n: v for n, v in robot.description.home.items() if n in {row.joint for row in self.rows}},
+        )
 
     def __str__(self) -> str:
         width = max([5, *(len(r.joint) for r in self.rows)])

@@ -22,8 +22,7 @@ from .description import (
     ShapeKind,
     Tendon,
 )
-from .dh import DHTable
-from .dh_derive import dh_table
+from .dh import DHChain
 from .export import save_dh, save_mjcf, save_urdf
 from .load import load_description
 from .meshes import link_surface, load_shape_mesh, read_mesh, shape_surface
@@ -35,7 +34,7 @@ from .urdf import parse_urdf, read_urdf
 
 __all__ = [
     "Actuator",
-    "DHTable",
+    "DHChain",
     "Description",
     "Inertial",
     "Joint",
@@ -51,7 +50,6 @@ __all__ = [
     "Tendon",
     "attach",
     "catalogue",
-    "dh_table",
     "link_surface",
     "load_description",
     "load_shape_mesh",

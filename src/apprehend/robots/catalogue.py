@@ -119,7 +119,7 @@ def applied(entry: Entry, description: Description) -> Description:
         name=entry.name,
         joints=tuple(joints),
         home={**description.home, **home},
-        tool=entry.tool,
+        tool=entry.tool or description.tool,
         repairs=tuple(repairs),
     )
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, as_shaped, choice
+from ..arrays import Array, as_array, as_shaped, choice
 from ..errors import InputError
 from .description import Description, Inertial, Joint, JointLimits, JointType, Link
 from .poses import shift, turn
@@ -23,8 +23,33 @@ CONVENTIONS = ("standard", "modified")
 _X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
+def dh_transform(theta: ArrayLike, d: ArrayLike, a: ArrayLike, alpha: ArrayLike, convention: str = "standard") -> Array:
+    """``A_{i−1,i} (..., 4, 4)`` of the four parameters, which broadcast (K DH-Transformationsmatrizen)."""
+    choice(convention, "convention", CONVENTIONS)
+    th, dd, aa, al = np.broadcast_arrays(*(as_array(v, n) for v, n in zip((theta, d, a, alpha), "θdaα", strict=True)))
+    c, s, ca, sa, zero, one = np.cos(th), np.sin(th), np.cos(al), np.sin(al), np.zeros_like(th), np.ones_like(th)
+    if convention == "standard":
+        rows = [[c, -s * ca, s * sa, aa * c], [s, c * ca, -c * sa, aa * s], [zero, sa, ca, dd]]
+    else:
+        rows = [[c, -s, zero, aa], [s * ca, c * ca, -sa, -dd * sa], [s * sa, c * sa, ca, dd * ca]]
+    rows.append([zero, zero, zero, one])
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def inverse_dh_transform(
+    theta: ArrayLike, d: ArrayLike, a: ArrayLike, alpha: ArrayLike, convention: str = "standard"
+) -> Array:
+    """``A_{i,i−1} = A_{i−1,i}⁻¹ (..., 4, 4)`` (K Inverse DH-Transformation)."""
+    A = dh_transform(theta, d, a, alpha, convention)
+    inverse = np.zeros_like(A)
+    inverse[..., :3, :3] = np.swapaxes(A[..., :3, :3], -1, -2)
+    inverse[..., :3, 3] = -(inverse[..., :3, :3] @ A[..., :3, 3:])[..., 0]
+    inverse[..., 3, 3] = 1.0
+    return inverse
+
+
 @dataclass(frozen=True, eq=False)
-class DHTable:
+class DHChain:
     """A chain of n joints by four numbers each, in m and rad, between a constant *base* and a constant *tool*.
 
     T_base_tool(q) = base · A_1(q_1) ⋯ A_n(q_n) · tool, where q_i adds to θ_i (revolute) or to d_i (prismatic), with a
@@ -73,35 +98,7 @@ class DHTable:
         q = as_shaped(q, "q", self.n) * np.where(self.flip, -1.0, 1.0)
         slides = np.array([t is JointType.PRISMATIC for t in self.types])
         theta, d = self.theta + np.where(slides, 0.0, q), self.d + np.where(slides, q, 0.0)
-        ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(self.alpha), np.sin(self.alpha)
-        A = np.zeros((*q.shape, 4, 4))
-        A[..., 3, 3] = 1.0
-        zero = np.zeros_like(theta)
-        if self.convention == "standard":
-            rows = [
-                (ct, -st * ca, st * sa, self.a * ct),
-                (st, ct * ca, -ct * sa, self.a * st),
-                (zero, sa + zero, ca + zero, d),
-            ]
-        else:
-            rows = [
-                (ct, -st, zero, self.a + zero),
-                (st * ca, ct * ca, -sa + zero, -sa * d),
-                (st * sa, ct * sa, ca + zero, ca * d),
-            ]
-        for i, row in enumerate(rows):
-            for j, value in enumerate(row):
-                A[..., i, j] = value
-        return A
-
-    def inverse_transforms(self, q: ArrayLike) -> Array:
-        """A_1⁻¹ … A_n⁻¹ at ``q (..., n)``, written out (K): ``(..., n, 4, 4)``."""
-        A = self.transforms(q)
-        inverse = np.zeros_like(A)
-        inverse[..., :3, :3] = np.swapaxes(A[..., :3, :3], -1, -2)
-        inverse[..., :3, 3] = -(inverse[..., :3, :3] @ A[..., :3, 3:])[..., 0]
-        inverse[..., 3, 3] = 1.0
-        return inverse
+        return dh_transform(theta, d, self.a, self.alpha, self.convention)
 
     def fk(self, q: ArrayLike) -> Array:
         """T_base_tool ``(..., 4, 4)`` at ``q (..., n)``."""

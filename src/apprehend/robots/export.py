@@ -14,7 +14,7 @@ from ..arrays import choice
 from ..errors import InputError
 from ..files import replace_file
 from .description import Description
-from .dh import DHTable
+from .dh import DHChain
 from .export_mjcf import mjcf_text
 from .export_urdf import srdf_text, urdf_text
 from .meshes import read_mesh
@@ -52,16 +52,21 @@ def save_mjcf(description: Description, path: str | Path, meshes: str = "copy") 
     return lost
 
 
-def save_dh(table: DHTable, path: str | Path) -> None:
-    """Write a DH table as TOML, in m and rad; `read_dh` reads it back exactly (inertias are not part of it)."""
+def save_dh(table: DHChain, path: str | Path) -> None:
+    """Write a DH table as TOML, in m and rad; `read_dh` reads it back exactly (inertias are not part of it,
+    and a home posture only if it names every joint).
+    """
     path = _checked(path, "omit", ".toml")
     bounds = ("lower", "upper", "velocity", "acceleration", "effort")
     columns = ["name", "type", "theta", "d", "a", "alpha", "flip", *bounds]
+    resting = all(name in table.home for name in table.names)
+    columns += ["home"] if resting else []
     rows = []
     for i, name in enumerate(table.names):
         values = [table.theta[i], table.d[i], table.a[i], table.alpha[i]]
         limits = [getattr(table.limits[i], bound) for bound in bounds]
         numbers = [*map(_number, values), str(table.flip[i]).lower(), *map(_number, limits)]
+        numbers += [_number(table.home[name])] if resting else []
         rows.append(f"  [{', '.join([_quoted(name), _quoted(table.types[i].value), *numbers])}],")
     lines = ['kind = "dh"', f"name = {_quoted(table.name)}", f"convention = {_quoted(table.convention)}"]
     lines += [f"columns = [{', '.join(map(_quoted, columns))}]", "rows = [", *rows, "]"]

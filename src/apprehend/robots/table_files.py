@@ -29,7 +29,7 @@ import numpy as np
 from ..arrays import Array, choice
 from ..errors import DescriptionError, suggestion
 from .description import Description, Inertial, Joint, JointLimits, JointType, Link, Repair
-from .dh import CONVENTIONS, DHTable
+from .dh import CONVENTIONS, DHChain
 from .inertia import check, nearest
 from .markup import read_text
 from .poses import from_rpy, shift
@@ -59,7 +59,7 @@ def read_table(path: str | Path, *, inertias: str = "repair") -> Description:
     return replace(description, source=path, repairs=tuple(table.repairs))
 
 
-def read_dh(path: str | Path) -> DHTable:
+def read_dh(path: str | Path) -> DHChain:
     """Read a TOML file with ``kind = "dh"`` as the table that it is."""
     path = Path(path)
     return _Table(path, _parsed(path)).dh()
@@ -196,7 +196,7 @@ class _Table:
         if not names:
             self.fail("there is no joint; a chain needs at least one")
 
-    def dh(self) -> DHTable:
+    def dh(self) -> DHChain:
         """The DH table of the file."""
         if self.data.get("kind") != "dh":
             self.fail(f"kind is {self.data.get('kind')!r}; expected 'dh'")
@@ -219,7 +219,7 @@ class _Table:
             if not isinstance(row.get("flip", False), bool):
                 self.fail(f"joint {name!r}: flip is {row['flip']!r}; expected true or false")
             flips.append(bool(row.get("flip", False)))
-        return DHTable(
+        return DHChain(
             convention, names, tuple(j[1] for j in joints), column["theta"], column["d"], column["a"], column["alpha"],
             self.pose(self.data.get("base"), "base"), self.pose(self.data.get("tool"), "tool"), tuple(flips),
             tuple(j[2] for j in joints), tuple(self.inertial(r, n) for r, n in zip(rows, names, strict=True)),
