@@ -326,11 +326,13 @@ def chain_jacobians(model, q, start, stop, reference, out, poses):
             turn_jacobian_block(pose, k, reference, jacobian)
         if poses.shape[0]:
             store_pose(pose, first, stop, poses)
-        for lane in range(min(LANES, stop - first)):
-            target = out[first + lane]
-            if k < n:
-                target[:] = 0.0
-            for r in range(6):
-                for c in range(k):
-                    target[r, model.free[c]] = jacobian[(6 * c + r) * LANES + lane]
+        block = out[first : min(first + LANES, stop)]
+        if k < n:
+            block[:] = 0.0
+        for c in range(k):
+            column = model.free[c]
+            start_of_column = at(c, 6)
+            for lane in range(block.shape[0]):
+                for r in range(6):
+                    block[lane, r, column] = jacobian[start_of_column + r * LANES + lane]
     return bad

@@ -63,23 +63,26 @@ def _shifted(place, i, q, coordinate, multiplier, offset, state):
 
 
 @kernel
-def _accelerate(i, parent, turning, rate, rate_rate, state):
+def _accelerate(i, parent, turning, multiplier, qd, qdd, coordinate, carrier, state):
     """Angular velocity and acceleration of joint i and acceleration of its origin, from its parent's.
 
-    *turning* is 1 for a revolute joint and 0 for a prismatic one; *rate* and *rate_rate* (LANES) its speed and
-    acceleration.
+    *turning* is 1 for a revolute joint and 0 for a prismatic one; speed and acceleration are *multiplier* times those of
+    its *coordinate*. The parent's part goes through *carrier* (9): see `carry_block`.
     """
     L = LANES
     t = at(i, WIDTH)
     s = at(parent, WIDTH)
+    d = at(coordinate, 1)
     sliding = 1.0 - turning
+    for c in range(9 * L):
+        carrier[c] = state[s + 12 * L + c]
     for lane in range(L):
-        wx = state[s + 12 * L + lane]
-        wy = state[s + 13 * L + lane]
-        wz = state[s + 14 * L + lane]
-        ax = state[s + 15 * L + lane]
-        ay = state[s + 16 * L + lane]
-        az = state[s + 17 * L + lane]
+        wx = carrier[lane]
+        wy = carrier[L + lane]
+        wz = carrier[2 * L + lane]
+        ax = carrier[3 * L + lane]
+        ay = carrier[4 * L + lane]
+        az = carrier[5 * L + lane]
         x = state[t + 9 * L + lane]
         y = state[t + 10 * L + lane]
         z = state[t + 11 * L + lane]
@@ -87,9 +90,9 @@ def _accelerate(i, parent, turning, rate, rate_rate, state):
         ux = wy * z - wz * y
         uy = wz * x - wx * z
         uz = wx * y - wy * x
-        bx = state[s + 18 * L + lane] + ay * z - az * y + wy * uz - wz * uy
-        by = state[s + 19 * L + lane] + az * x - ax * z + wz * ux - wx * uz
-        bz = state[s + 20 * L + lane] + ax * y - ay * x + wx * uy - wy * ux
+        bx = carrier[6 * L + lane] + ay * z - az * y + wy * uz - wz * uy
+        by = carrier[7 * L + lane] + az * x - ax * z + wz * ux - wx * uz
+        bz = carrier[8 * L + lane] + ax * y - ay * x + wx * uy - wy * ux
         r00 = state[t + lane]
         r01 = state[t + L + lane]
         r02 = state[t + 2 * L + lane]
@@ -99,20 +102,20 @@ def _accelerate(i, parent, turning, rate, rate_rate, state):
         r20 = state[t + 6 * L + lane]
         r21 = state[t + 7 * L + lane]
         r22 = state[t + 8 * L + lane]
-        qd = rate[lane]
-        qdd = rate_rate[lane]
+        rate = multiplier * qd[d + lane]
+        rate_rate = multiplier * qdd[d + lane]
         w0 = r00 * wx + r10 * wy + r20 * wz
         w1 = r01 * wx + r11 * wy + r21 * wz
         w2 = r02 * wx + r12 * wy + r22 * wz
         state[t + 12 * L + lane] = w0
         state[t + 13 * L + lane] = w1
-        state[t + 14 * L + lane] = w2 + turning * qd
-        state[t + 15 * L + lane] = r00 * ax + r10 * ay + r20 * az + turning * w1 * qd
-        state[t + 16 * L + lane] = r01 * ax + r11 * ay + r21 * az - turning * w0 * qd
-        state[t + 17 * L + lane] = r02 * ax + r12 * ay + r22 * az + turning * qdd
-        state[t + 18 * L + lane] = r00 * bx + r10 * by + r20 * bz + 2.0 * sliding * w1 * qd
-        state[t + 19 * L + lane] = r01 * bx + r11 * by + r21 * bz - 2.0 * sliding * w0 * qd
-        state[t + 20 * L + lane] = r02 * bx + r12 * by + r22 * bz + sliding * qdd
+        state[t + 14 * L + lane] = w2 + turning * rate
+        state[t + 15 * L + lane] = r00 * ax + r10 * ay + r20 * az + turning * w1 * rate
+        state[t + 16 * L + lane] = r01 * ax + r11 * ay + r21 * az - turning * w0 * rate
+        state[t + 17 * L + lane] = r02 * ax + r12 * ay + r22 * az + turning * rate_rate
+        state[t + 18 * L + lane] = r00 * bx + r10 * by + r20 * bz + 2.0 * sliding * w1 * rate
+        state[t + 19 * L + lane] = r01 * bx + r11 * by + r21 * bz - 2.0 * sliding * w0 * rate
+        state[t + 20 * L + lane] = r02 * bx + r12 * by + r22 * bz + sliding * rate_rate
 
 
 @kernel
@@ -149,11 +152,15 @@ def _load(i, inertia, state):
 
 
 @kernel
-def _hand_down(i, parent, state):
-    """Add force and moment of joint i to its parent's."""
+def _hand_down(i, parent, multiplier, armature, turning, qdd, coordinate, load, state, tau):
+    """Add joint i's torque to *tau* at its coordinate, and its force and moment, through *load* (6), to its parent's."""
     L = LANES
     t = at(i, WIDTH)
     s = at(parent, WIDTH)
+    d = at(coordinate, 1)
+    rotor = armature * multiplier * multiplier
+    sliding = multiplier * (1.0 - turning)
+    turning *= multiplier
     for lane in range(L):
         x = state[t + 9 * L + lane]
         y = state[t + 10 * L + lane]
@@ -164,6 +171,7 @@ def _hand_down(i, parent, state):
         n0 = state[t + 24 * L + lane]
         n1 = state[t + 25 * L + lane]
         n2 = state[t + 26 * L + lane]
+        tau[d + lane] += turning * n2 + sliding * f2 + rotor * qdd[d + lane]
         r00 = state[t + lane]
         r01 = state[t + L + lane]
         r02 = state[t + 2 * L + lane]
@@ -176,17 +184,19 @@ def _hand_down(i, parent, state):
         fx = r00 * f0 + r01 * f1 + r02 * f2
         fy = r10 * f0 + r11 * f1 + r12 * f2
         fz = r20 * f0 + r21 * f1 + r22 * f2
-        state[s + 21 * L + lane] += fx
-        state[s + 22 * L + lane] += fy
-        state[s + 23 * L + lane] += fz
-        state[s + 24 * L + lane] += r00 * n0 + r01 * n1 + r02 * n2 + y * fz - z * fy
-        state[s + 25 * L + lane] += r10 * n0 + r11 * n1 + r12 * n2 + z * fx - x * fz
-        state[s + 26 * L + lane] += r20 * n0 + r21 * n1 + r22 * n2 + x * fy - y * fx
+        load[lane] = fx
+        load[L + lane] = fy
+        load[2 * L + lane] = fz
+        load[3 * L + lane] = r00 * n0 + r01 * n1 + r02 * n2 + y * fz - z * fy
+        load[4 * L + lane] = r10 * n0 + r11 * n1 + r12 * n2 + z * fx - x * fz
+        load[5 * L + lane] = r20 * n0 + r21 * n1 + r22 * n2 + x * fy - y * fx
+    for c in range(6 * L):
+        state[s + 21 * L + c] += load[c]
 
 
 @kernel
 def inverse_block(model, q, qd, qdd, gravity, scratch, state, tau):
-    """Torques ``tau (n * LANES)`` of one block; ``scratch (2 * LANES)``, ``state ((m + 1) * WIDTH * LANES)``."""
+    """Torques ``tau (n * LANES)`` of one block; ``scratch (9 * LANES)``, ``state ((m + 1) * WIDTH * LANES)``."""
     L = LANES
     m = model.kind.shape[0]
     gain = model.gain
@@ -197,8 +207,6 @@ def inverse_block(model, q, qd, qdd, gravity, scratch, state, tau):
         for lane in range(L):
             state[root + (18 + k) * L + lane] = -gravity[k]
     near = within_sincos(q, model)
-    rate = scratch[:L]
-    rate_rate = scratch[L:]
     for i in range(m):
         c = model.coordinate[i]
         multiplier = gain[i, 0]
@@ -209,27 +217,19 @@ def inverse_block(model, q, qd, qdd, gravity, scratch, state, tau):
         elif near:
             _turned(model.place, i, q, c, multiplier, gain[i, 1], state)
         else:
-            wrap_angles(q, c, multiplier, gain[i, 1], rate)
-            _turned(model.place, i, rate, 0, 1.0, 0.0, state)
-        d = at(c, 1)
-        for lane in range(L):
-            rate[lane] = multiplier * qd[d + lane]
-            rate_rate[lane] = multiplier * qdd[d + lane]
+            wrap_angles(q, c, multiplier, gain[i, 1], scratch)
+            _turned(model.place, i, scratch, 0, 1.0, 0.0, state)
         parent = model.parent[i]
-        _accelerate(i, m if parent < 0 else parent, turning, rate, rate_rate, state)
+        _accelerate(i, m if parent < 0 else parent, turning, multiplier, qd, qdd, c, scratch, state)
         _load(i, model.inertia, state)
     for j in range(tau.shape[0]):
         tau[j] = 0.0
     for r in range(m):
         i = m - 1 - r
-        row = at(i, WIDTH) + (26 if model.kind[i] == REVOLUTE else 23) * L
-        d = at(model.coordinate[i], 1)
-        multiplier = gain[i, 0]
-        armature = model.armature[i] * multiplier * multiplier
-        for lane in range(L):
-            tau[d + lane] += multiplier * state[row + lane] + armature * qdd[d + lane]
+        turning = 1.0 if model.kind[i] == REVOLUTE else 0.0
         parent = model.parent[i]
-        _hand_down(i, m if parent < 0 else parent, state)
+        parent = m if parent < 0 else parent
+        _hand_down(i, parent, gain[i, 0], model.armature[i], turning, qdd, model.coordinate[i], scratch, state, tau)
 
 
 @kernel
@@ -243,7 +243,7 @@ def inverse_dynamics(model, q, qd, qdd, gravity, start, stop, out):
     bq = np.empty(n * LANES)
     bqd = np.zeros(n * LANES)
     bqdd = np.zeros(n * LANES)
-    scratch = np.empty(2 * LANES)
+    scratch = np.empty(9 * LANES)
     state = np.empty((m + 1) * WIDTH * LANES)
     tau = np.empty(n * LANES)
     bad = -1

@@ -6,6 +6,8 @@ The lower triangle of a symmetric n × n matrix is packed row by row: entry (i, 
 
 from __future__ import annotations
 
+import numpy as np
+
 from ._jit import kernel
 from .lanes import LANES
 
@@ -17,48 +19,69 @@ def entry(i, j):
 
 
 @kernel
-def factor_block(A, n):
-    """Factor ``A = L D Lᵀ`` in place (unit lower L, D on the diagonal); A is a packed triangle on lanes."""
+def factor_block(A, n, scratch):
+    """Factor ``A = L D Lᵀ`` in place (unit lower L, D on the diagonal); A is a packed triangle, *scratch* (1) on lanes.
+
+    Sums gather in *scratch*: a loop that reads and writes one array at offsets known at run time does not vectorise.
+    """
     for i in range(n):
         ii = entry(i, i)
         for j in range(i):
             ij = entry(i, j)
+            for lane in range(LANES):
+                scratch[lane] = A[ij + lane]
             for k in range(j):
                 ik = entry(i, k)
                 jk = entry(j, k)
                 # row i holds L D until its turn ends
                 for lane in range(LANES):
-                    A[ij + lane] -= A[ik + lane] * A[jk + lane]
-        for j in range(i):
-            ij = entry(i, j)
-            jj = entry(j, j)
+                    scratch[lane] -= A[ik + lane] * A[jk + lane]
             for lane in range(LANES):
-                scaled = A[ij + lane]
-                factor = scaled / A[jj + lane]
-                A[ij + lane] = factor
-                A[ii + lane] -= factor * scaled
+                A[ij + lane] = scratch[lane]
+        for lane in range(LANES):
+            scratch[lane] = A[ii + lane]
+        for j in range(i):
+            _scale(A, entry(i, j), entry(j, j), scratch)
+        for lane in range(LANES):
+            A[ii + lane] = scratch[lane]
 
 
 @kernel
-def solve_block(A, n, x):
-    """Solve in place for ``x (n * LANES)`` with the factors that `factor_block` left in *A*."""
+def _scale(A, ij, jj, diagonal):
+    """Turn entry ij of L D into L and take its part off the diagonal of its row."""
+    factor = np.empty(LANES)
+    for lane in range(LANES):
+        factor[lane] = A[ij + lane] / A[jj + lane]
+    for lane in range(LANES):
+        diagonal[lane] -= factor[lane] * A[ij + lane]
+    for lane in range(LANES):
+        A[ij + lane] = factor[lane]
+
+
+@kernel
+def solve_block(A, n, x, scratch):
+    """Solve in place for ``x (n * LANES)`` with the factors that `factor_block` left in *A*; *scratch* (1) on lanes."""
     for i in range(n):
         xi = (i * LANES) & 0x7FFFFFFF
+        for lane in range(LANES):
+            scratch[lane] = x[xi + lane]
         for j in range(i):
             ij = entry(i, j)
             xj = (j * LANES) & 0x7FFFFFFF
             for lane in range(LANES):
-                x[xi + lane] -= A[ij + lane] * x[xj + lane]
-    for i in range(n):
+                scratch[lane] -= A[ij + lane] * x[xj + lane]
+        for lane in range(LANES):
+            x[xi + lane] = scratch[lane]
+    for r in range(n):
+        i = n - 1 - r
         ii = entry(i, i)
         xi = (i * LANES) & 0x7FFFFFFF
         for lane in range(LANES):
-            x[xi + lane] /= A[ii + lane]
-    for r in range(n):
-        i = n - 1 - r
-        xi = (i * LANES) & 0x7FFFFFFF
-        for j in range(i):
-            ij = entry(i, j)
+            scratch[lane] = x[xi + lane] / A[ii + lane]
+        for j in range(i + 1, n):
+            ji = entry(j, i)
             xj = (j * LANES) & 0x7FFFFFFF
             for lane in range(LANES):
-                x[xj + lane] -= A[ij + lane] * x[xi + lane]
+                scratch[lane] -= A[ji + lane] * x[xj + lane]
+        for lane in range(LANES):
+            x[xi + lane] = scratch[lane]

@@ -116,7 +116,7 @@ def _axis_and_momentum(i, turning, origin, poses, composite, screw):
 def mass_block(model, q, origin, scratch, poses, composite, screw, M):
     """Mass matrix of one block: a packed triangle (see `linalg`).
 
-    Buffers on lanes: ``scratch (1)``, ``poses (12 m)``, ``composite (10 m)``, ``screw (12 m)``.
+    Buffers on lanes: ``scratch (12)``, ``poses (12 m)``, ``composite (10 m)``, ``screw (12 m)``.
     """
     L = LANES
     m = model.kind.shape[0]
@@ -131,8 +131,10 @@ def mass_block(model, q, origin, scratch, poses, composite, screw, M):
         if parent >= 0:
             s = at(parent, 10)
             t = at(i, 10)
-            for lane in range(10 * L):
-                composite[s + lane] += composite[t + lane]
+            for c in range(10 * L):
+                scratch[c] = composite[t + c]
+            for c in range(10 * L):
+                composite[s + c] += scratch[c]
         _axis_and_momentum(i, 1.0 if model.kind[i] == REVOLUTE else 0.0, origin, poses, composite, screw)
     for i in range(m):
         c = model.coordinate[i]
@@ -140,8 +142,9 @@ def mass_block(model, q, origin, scratch, poses, composite, screw, M):
         diagonal = entry(c, c)
         gain = model.gain[i, 0]
         armature = model.armature[i] * gain * gain
-        for lane in range(L):
-            M[diagonal + lane] += armature
+        if armature != 0.0:
+            for lane in range(L):
+                M[diagonal + lane] += armature
         j = i
         while j >= 0:
             b = model.coordinate[j]
@@ -168,7 +171,7 @@ def mass_matrix(model, q, start, stop, out):
     n = q.shape[1]
     m = model.kind.shape[0]
     buffer = np.empty(n * LANES)
-    scratch = np.empty(LANES)
+    scratch = np.empty(12 * LANES)
     poses = np.empty(12 * m * LANES)
     composite = np.empty(10 * m * LANES)
     screw = np.empty(12 * m * LANES)
@@ -182,12 +185,14 @@ def mass_matrix(model, q, start, stop, out):
         if row >= 0 and bad < 0:
             bad = row
         mass_block(model, buffer, origin, scratch, poses, composite, screw, M)
-        for lane in range(min(LANES, stop - first)):
-            for i in range(n):
-                for j in range(i + 1):
-                    value = M[entry(i, j) + lane]
-                    out[first + lane, i, j] = value
-                    out[first + lane, j, i] = value
+        block = out[first : min(first + LANES, stop)]
+        for i in range(n):
+            for j in range(i + 1):
+                e = entry(i, j)
+                for lane in range(block.shape[0]):
+                    value = M[e + lane]
+                    block[lane, i, j] = value
+                    block[lane, j, i] = value
     return bad
 
 
@@ -204,7 +209,7 @@ def forward_dynamics(model, q, qd, tau, gravity, start, stop, out):
     bqd = np.empty(n * LANES)
     btau = np.empty(n * LANES)
     zero = np.zeros(n * LANES)
-    scratch = np.empty(2 * LANES)
+    scratch = np.empty(12 * LANES)
     state = np.empty((m + 1) * WIDTH * LANES)
     bias = np.empty(n * LANES)
     poses = np.empty(12 * m * LANES)
@@ -234,10 +239,10 @@ def forward_dynamics(model, q, qd, tau, gravity, start, stop, out):
             d = entry(i, i)
             for lane in range(LANES):
                 size[i * LANES + lane] = M[d + lane]
-        factor_block(M, n)
+        factor_block(M, n, scratch)
         for j in range(n * LANES):
             btau[j] -= bias[j]
-        solve_block(M, n, btau)
+        solve_block(M, n, btau, scratch)
         for lane in range(min(LANES, stop - first)):
             for i in range(n):
                 if not M[entry(i, i) + lane] > 1e-14 * size[i * LANES + lane] and singular < 0:

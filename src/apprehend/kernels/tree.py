@@ -51,8 +51,11 @@ class TreeModel(NamedTuple):
 
 
 @kernel
-def carry_block(place, i, poses, parent, target):
-    """``poses[target] = poses[parent] · place[i]`` on lanes; poses are 12 components each, parent −1 is the world."""
+def carry_through(place, i, poses, parent, target, scratch):
+    """``poses[target] = poses[parent] · place[i]`` on lanes; poses are 12 components each, parent −1 is the world.
+
+    The parent goes through *scratch* (12): a loop on one array at two offsets known at run time does not vectorise.
+    """
     L = LANES
     r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
     r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
@@ -66,16 +69,24 @@ def carry_block(place, i, poses, parent, target):
                 poses[t + k * L + lane] = value
         return
     s = at(parent, 12)
+    for c in range(12 * L):
+        scratch[c] = poses[s + c]
     for lane in range(L):
         for k in range(3):
-            a0 = poses[s + 3 * k * L + lane]
-            a1 = poses[s + (3 * k + 1) * L + lane]
-            a2 = poses[s + (3 * k + 2) * L + lane]
-            p = poses[s + (9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
+            a0 = scratch[3 * k * L + lane]
+            a1 = scratch[(3 * k + 1) * L + lane]
+            a2 = scratch[(3 * k + 2) * L + lane]
+            p = scratch[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
             poses[t + 3 * k * L + lane] = a0 * r00 + a1 * r10 + a2 * r20
             poses[t + (3 * k + 1) * L + lane] = a0 * r01 + a1 * r11 + a2 * r21
             poses[t + (3 * k + 2) * L + lane] = a0 * r02 + a1 * r12 + a2 * r22
             poses[t + (9 + k) * L + lane] = p
+
+
+@kernel
+def carry_block(place, i, poses, parent, target):
+    """`carry_through` with a scratch of its own."""
+    carry_through(place, i, poses, parent, target, np.empty(12 * LANES))
 
 
 @kernel
@@ -111,8 +122,9 @@ def tree_block(model, q, value, poses):
     gain = model.gain
     coordinate = model.coordinate
     near = within_sincos(q, model)
+    scratch = np.empty(12 * LANES)
     for i in range(model.kind.shape[0]):
-        carry_block(model.place, i, poses, model.parent[i], i)
+        carry_through(model.place, i, poses, model.parent[i], i, scratch)
         if model.kind[i] == PRISMATIC:
             shift_block(q, coordinate[i], gain[i, 0], gain[i, 1], poses, i)
         elif near:
@@ -131,6 +143,7 @@ def tree_poses(model, q, start, stop, out):
     m = model.kind.shape[0]
     buffer = np.empty(q.shape[1] * LANES)
     value = np.empty(LANES)
+    scratch = np.empty(12 * LANES)
     poses = np.empty(12 * (m + 1) * LANES)
     frame = m
     bad = -1
@@ -140,7 +153,7 @@ def tree_poses(model, q, start, stop, out):
             bad = row
         tree_block(model, buffer, value, poses)
         for f in range(model.frame_joint.shape[0]):
-            carry_block(model.frame_place, f, poses, model.frame_joint[f], frame)
+            carry_through(model.frame_place, f, poses, model.frame_joint[f], frame, scratch)
             t = 12 * frame * LANES
             for lane in range(min(LANES, stop - first)):
                 target = out[first + lane, f]
