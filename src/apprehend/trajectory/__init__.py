@@ -8,6 +8,7 @@ from .follow import follow, rounded, smoothed, through_samples
 from .geometry import NaturalPath, arc_length, bending_energy, curvature, tangent, torsion
 from .jerk import jerk_limited, state_to_state
 from .limits import LimitReport, Limits, LimitStatus
+from .many import Timings, time_optimal_many
 from .motion import Samples, Trajectory, concatenate, pause
 from .optimise import Compromise, nondominated, optimise, pareto
 from .path import Path, PolynomialPath, as_polynomial, polyline
@@ -48,6 +49,7 @@ __all__ = [
     "Spline",
     "Timing",
     "TimingStatus",
+    "Timings",
     "TorqueLimits",
     "Trajectory",
     "along",
@@ -86,6 +88,7 @@ __all__ = [
     "through",
     "through_samples",
     "time_optimal",
+    "time_optimal_many",
     "to_csv",
     "to_json",
     "tool_frame",

@@ -14,7 +14,6 @@ from ..arrays import Array, as_array
 from ..errors import InputError
 from ..kernels import path as path_kernels
 from ..kernels import timing as kernels
-from ..kernels.lanes import LANES
 from ..result import Result, Status
 from .constraints import Constraint, PowerLimits
 from .limits import LimitReport, Limits
@@ -80,6 +79,13 @@ class Timing(Result):
         return self.motion.check(self.limits)
 
 
+def profile_timing(path: PolynomialPath, limits: Limits, grid: Array, x: Array) -> Timing:
+    """The timing with a known profile of squared speeds *x* on *grid*."""
+    t, timing = np.zeros(grid.size), np.zeros((grid.size - 1, 3))
+    kernels.times(grid, x, t, timing)
+    return Timing(TimingStatus.SUCCESS, path, limits, grid, np.sqrt(x), t, timing)
+
+
 def composed(path: PolynomialPath, t: Array, timing: Array) -> Trajectory:
     """``q(s(t))`` as a piecewise polynomial: *timing* ``(N, E + 1)`` holds s on every interval of *t* ``(N + 1,)``."""
     out = np.empty((timing.shape[0], path.degree * (timing.shape[1] - 1) + 1, path.n))
@@ -143,7 +149,7 @@ class _Problem:
         count = self.grid.size - 1
         x, alpha, beta, t = np.zeros((4, count + 1))
         timing = np.zeros((count, 3))
-        values, bounds = (_NO_SAMPLES, _NO_BOUNDS) if sampled is None else (sampled.values, sampled.bounds)
+        values, bounds = (NO_SAMPLES, NO_BOUNDS) if sampled is None else (sampled.values, sampled.bounds)
         status, stage = kernels.solve(
             self.path.breaks, self.path.coefficients, self.grid, self.vlim, self.alim, values, bounds,
             binomials(2 * self.path.degree), self.start_speed**2, self.end_speed**2, alpha, beta, x, t, timing,
@@ -221,16 +227,16 @@ def conflict(
     path: PolynomialPath, grid: Array, stage: int, vlim: Array, alim: Array, sampled: Sampled | None, y_high: float
 ) -> str:
     """Which rows of interval *stage* exclude every speed, in words."""
-    values, bounds = (_NO_SAMPLES, _NO_BOUNDS) if sampled is None else (
+    values, bounds = (NO_SAMPLES, NO_BOUNDS) if sampled is None else (
         sampled.values[stage : stage + 1], sampled.bounds[stage : stage + 1]
     )  # fmt: skip
     rows = int(kernels.row_count(path.degree, path.n, values.shape[2]))
-    slope, low, high = np.empty((3, 1, rows, LANES))
-    cap = np.empty((1, 2, LANES))
+    table = np.empty((1, (3 * rows + 2) * kernels.WIDE))
     kernels.rows_along(
         path.breaks, path.coefficients, grid[stage : stage + 2], vlim, alim, values, bounds,
-        binomials(2 * path.degree), slope, low, high, cap,
+        binomials(2 * path.degree), table,
     )  # fmt: skip
+    _, low, high = table[0].reshape(-1, kernels.WIDE)[: 3 * rows, 0].reshape(rows, 3).T
     if sampled is not None:
         still = sampled.values[stage, :, :, 2]
         excess = np.maximum(still - sampled.bounds[stage, :, 1], sampled.bounds[stage, :, 0] - still).max(axis=0)
@@ -241,8 +247,8 @@ def conflict(
     names = [f"acceleration of coordinate {j}" for j in range(path.n) for _ in range(path.degree)]
     names += ["velocity"] * (2 * path.degree - 1)
     names += [name for name in (sampled.names if sampled is not None else ()) for _ in range(4)]
-    top, bottom = int(high[0, :, 0].argmin()), int(low[0, :, 0].argmax())
-    upper = names[top] if high[0, top, 0] < y_high else "the speed that can still be braked further on"
+    top, bottom = int(high.argmin()), int(low.argmax())
+    upper = names[top] if high[top] < y_high else "the speed that can still be braked further on"
     return f"{names[bottom]} and {upper} contradict each other at every speed"
 
 
@@ -252,8 +258,8 @@ def make_grid(path: PolynomialPath, grid: int | ArrayLike, least: int = 1) -> Ar
     if isinstance(grid, (int, np.integer)):
         if grid < 1:
             raise InputError(f"grid is {grid}; expected a number of intervals ≥ 1, or the grid points")
-        parts = np.maximum(np.ceil(np.diff(breaks) * (int(grid) / (breaks[-1] - breaks[0])) - 1e-9), least)
-        out = np.empty(int(parts.sum()) + 1)
+        parts = np.empty(breaks.size - 1, dtype=np.int64)
+        out = np.empty(kernels.split_evenly(breaks, int(grid), least, parts) + 1)
         kernels.subdivide(breaks, parts, out)
         return out
     points = as_array(grid, "grid")
@@ -290,5 +296,5 @@ def binomials(size: int) -> Array:
     return table
 
 
-_NO_SAMPLES = np.empty((1, 3, 0, 3))
-_NO_BOUNDS = np.empty((1, 0, 2))
+NO_SAMPLES = np.empty((1, 3, 0, 3))
+NO_BOUNDS = np.empty((1, 0, 2))
