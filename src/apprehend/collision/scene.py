@@ -47,7 +47,7 @@ class RobotSource:
         if self.hand is None:
             return arm.placed(self.base), None
         hand = Robot.load(self.hand)
-        at = end_link(arm.description) if self.at is None else self.at
+        at = self.at or arm.description.tool or end_link(arm.description)
         if at not in arm.frame_names:
             unknown_name("link", at, arm.frame_names, f"robot {arm.name!r} (to carry {self.hand!r})")
         prefix = self.prefix

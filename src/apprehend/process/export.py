@@ -12,7 +12,7 @@ from ..collision import Scene
 from .context import Context
 
 
-def scene_data(scene: Scene) -> tuple[dict[str, Any], dict[str, tuple[Array, Array]]]:
+def scene_data(scene: Scene) -> tuple[dict[str, Any], dict[str, tuple[np.ndarray, np.ndarray]]]:
     """What stands where, with one mesh file for each body; and the meshes by file name."""
     source = scene.robot_source
     meshes = {f"meshes/{name}.obj": (placed.body.vertices, placed.body.faces) for name, placed in scene.bodies.items()}

@@ -11,7 +11,7 @@ from ..arrays import Array
 from ..sim import grip
 from .choose import choose
 from .context import Context
-from .motion import in_hand
+from .motion import ACCELERATION, in_hand
 from .step import Outcome
 
 GRASPS = 80
@@ -35,7 +35,9 @@ class PlanGrasp:
         if context.plan is None or context.tried:
             context.tell("searching the surface")
             planes = np.array([support_plane(context, T) for T in (context.pose, context.goal)])
-            context.plan = grasp.plan(context.hand, context.body, GRASPS, rng=context.rng, table=planes)
+            context.plan = grasp.plan(
+                context.hand, context.body, GRASPS, rng=context.rng, table=planes, acceleration=ACCELERATION
+            )
         plan = context.plan
         if not plan.success:
             return Outcome(False, plan.explain())

@@ -2,37 +2,105 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..arrays import Array
+from ..perception import Camera, LocateStatus, Noise, Plane, locate, look_at
+from ..sim import look
 from .context import Context
+from .judge import angle
 from .step import Outcome
+
+AZIMUTHS = (-1.0, 1.0)
+"""Directions in rad, from the robot over the object, in which the scene's cameras stand."""
+
+DISTANCE, HEIGHT = 0.55, 0.65
+"""Horizontal distance in m of the cameras from the object's described place, and their height above it."""
+
+SEARCH = 0.3
+"""Half the width in m of the region around the described place in which the object is looked for."""
 
 
 @dataclass(frozen=True)
 class Locate:
-    """Let the scene come to rest, and read the object's pose from the simulator's state.
+    """Let the scene come to rest, and find the object in noisy depth images of two fixed cameras (perception room).
 
-    This is the step to replace by one that sees: it must set ``context.pose`` to T_world_body.
+    The described pose says where to look and which of several equivalent poses of a symmetric object is meant; where
+    it does not fit what is seen, the whole region around it is searched without it.
     """
+
+    name: str = "locate"
+    title: str = "Locate the object"
+    camera: Camera = field(default_factory=lambda: Camera.from_fov(320, 240))
+    noise: Noise = field(default_factory=Noise)
+
+    def run(self, context: Context) -> Outcome:
+        """Settle, look, find; the simulator's true pose serves to state the error, and nothing else."""
+        settled = settle(context)
+        if not settled.success:
+            return settled
+        described = context.scene.bodies[context.name].pose
+        centre = described[:3, :3] @ context.body.com + described[:3, 3]
+        views = [look(context.world, self.camera, pose, noise=self.noise).image for pose in viewpoints(context, centre)]
+        plane = Plane(offset=float((context.body.vertices @ described[2, :3] + described[2, 3]).min()))
+        region = np.array([centre - SEARCH, centre + SEARCH])
+        result = locate(
+            views, context.body, plane=plane, rng=context.rng, region=region, guess=described, noise=self.noise
+        )
+        if result.status is not LocateStatus.SUCCESS:
+            context.tell("it is not where it was described; searching around")
+            result = locate(views, context.body, plane=plane, rng=context.rng, region=region, noise=self.noise)
+        if result.status in (LocateStatus.NOT_SEEN, LocateStatus.POOR_FIT):
+            return Outcome(False, result.explain())
+        context.pose = result.pose
+        truth = context.world.body_pose(context.name)
+        com = context.body.com
+        off = float(np.linalg.norm((result.pose - truth)[:3, :3] @ com + (result.pose - truth)[:3, 3]))
+        x, y, z = result.pose[:3, 3]
+        return Outcome(
+            True,
+            f"{context.name} seen at ({x:.3f}, {y:.3f}, {z:.3f}) m, {off * 1e3:.1f} mm off the truth",
+            inputs={"source": "two depth cameras", "pixels": result.pixels},
+            outputs={"pose": result.pose, "residual": result.residual, "fitness": result.fitness},
+            margins={"error": off, "turn": angle(truth[:3, :3].T @ result.pose[:3, :3])},
+        )
+
+
+@dataclass(frozen=True)
+class LocateByState:
+    """Let the scene come to rest, and read the object's pose from the simulator: perfect perception."""
 
     name: str = "locate"
     title: str = "Locate the object"
 
     def run(self, context: Context) -> Outcome:
         """Settle, then read."""
-        described = context.scene.bodies[context.name].pose
-        settled = context.world.settle(context.arm, context.gripper)
-        context.pose = context.world.body_pose(context.name)
-        moved = float(np.linalg.norm(context.pose[:3, 3] - described[:3, 3]))
-        x, y, z = context.pose[:3, 3]
+        settled = settle(context)
         if not settled.success:
-            return Outcome(False, f"the scene did not come to rest: {settled.explain()}", margins={"moved": moved})
+            return settled
+        context.pose = context.world.body_pose(context.name)
+        x, y, z = context.pose[:3, 3]
         return Outcome(
             True,
             f"{context.name} rests at ({x:.3f}, {y:.3f}, {z:.3f}) m",
-            inputs={"source": "simulator state"},
-            outputs={"pose": context.pose},
-            margins={"moved": moved},
+            {"source": "simulator"},
+            {"pose": context.pose},
         )
+
+
+def settle(context: Context) -> Outcome:
+    """Wait until the scene is at rest."""
+    result = context.world.settle(context.arm, context.gripper)
+    return Outcome(result.success, "" if result.success else f"the scene did not come to rest: {result.explain()}")
+
+
+def viewpoints(context: Context, centre: Array) -> list[Array]:
+    """Poses T_world_camera that look at *centre* from both sides, beyond it as seen from the robot."""
+    out = centre[:2] - context.robot.base[:2, 3]
+    heading = float(np.arctan2(out[1], out[0]))
+    eyes = [
+        centre + np.array([DISTANCE * np.cos(heading + a), DISTANCE * np.sin(heading + a), HEIGHT]) for a in AZIMUTHS
+    ]
+    return [look_at(eye, centre) for eye in eyes]

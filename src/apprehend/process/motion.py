@@ -20,6 +20,12 @@ SETTLE = 0.15
 DEFAULT_ACCELERATION = 2.5
 """rad/s² where a description gives no acceleration limit: the slowest of the arms whose limits are published."""
 
+ACCELERATION = 2.0
+"""Largest acceleration in m/s² of a held object; grasps are planned to withstand it in every direction."""
+
+SAMPLES = 400
+"""Samples of a motion at which it is checked."""
+
 FREE, CARRYING, CAREFUL = 0.8, 0.5, 0.25
 """Shares of the velocity limits: in free space, with an object in the hand, and next to an object."""
 
@@ -43,6 +49,20 @@ def limits(context: Context, share: float) -> Limits:
     return Limits(velocity=velocity, acceleration=acceleration * min(1.0, 1.25 * share))
 
 
+def gentle(context: Context, motion: Trajectory) -> Trajectory:
+    """*motion*, slowed down where it would accelerate the held object by more than the grasp was planned for."""
+    if context.held is None:
+        return motion
+    t = np.linspace(0.0, motion.duration, SAMPLES)
+    q = np.repeat(context.world.q[None], SAMPLES, axis=0)
+    q[:, context.joints] = motion(t)
+    com = context.held[:3, :3] @ context.body.com + context.held[:3, 3]
+    path = context.robot.fk(q, context.hand.root) @ np.append(com, 1.0)
+    acceleration = np.diff(path[:, :3], n=2, axis=0) / (t[1] - t[0]) ** 2
+    peak = float(np.linalg.norm(acceleration, axis=1).max())
+    return motion.stretched(np.sqrt(peak / ACCELERATION)) if peak > ACCELERATION else motion
+
+
 def along_path(context: Context, path: Array, model: CollisionModel, share: float) -> Trajectory:
     """A motion along a planned polyline ``(m, n)``: corners rounded as far as that stays free of collision."""
     points = path[:, context.joints]
@@ -50,16 +70,16 @@ def along_path(context: Context, path: Array, model: CollisionModel, share: floa
     if len(points) > 2:
         for deviation in (ROUNDING, ROUNDING / 4):
             motion = follow(points, bounds, deviation=deviation)
-            samples = np.repeat(path[:1], 400, axis=0)
-            samples[:, context.joints] = motion(np.linspace(0.0, motion.duration, 400))
+            samples = np.repeat(path[:1], SAMPLES, axis=0)
+            samples[:, context.joints] = motion(np.linspace(0.0, motion.duration, SAMPLES))
             if model.edges_free(samples[:-1], samples[1:]).all():
-                return motion
-    return follow(points, bounds)
+                return gentle(context, motion)
+    return gentle(context, follow(points, bounds))
 
 
 def along_line(context: Context, samples: Array, share: float) -> Trajectory:
     """A motion along dense joint samples ``(m, n)`` of a straight line of the hand."""
-    return through_samples(samples[:, context.joints], limits(context, share))
+    return gentle(context, through_samples(samples[:, context.joints], limits(context, share)))
 
 
 def execute(context: Context, motion: Trajectory) -> Done:
