@@ -57,6 +57,7 @@ def compare(description: Description, model: Any, count: int = 10) -> None:
             P = T[robot.frame_index(model.body(i).name)]
             assert np.abs(P[:3, 3] - data.xpos[i]).max() < 1e-12
             assert np.abs(P[:3, :3].ravel() - data.xmat[i]).max() < 1e-12
+    couples(description, model, robot, rng)
     for i in range(1, model.nbody):
         inertial = description.links[model.body(i).name].inertial
         assert (inertial.mass if inertial else 0.0) == model.body_mass[i]
@@ -74,6 +75,27 @@ def compare(description: Description, model: Any, count: int = 10) -> None:
         assert np.array_equal(ours, row)
         length = sum(arm * data.qpos[model.joint(j).qposadr[0]] for j, arm in arms.items())
         assert data.tendon(name).length[0] == pytest.approx(length, abs=1e-12)
+
+
+def couples(description: Description, model: Any, robot: Robot, rng: Any) -> None:
+    """Inverse dynamics and mass matrix agree with MuJoCo's, of which mimicking joints are eliminated."""
+    data = mujoco.MjData(model)
+    E, e = np.zeros((model.nv, robot.n)), np.zeros(model.nv)
+    for joint in description.joints:
+        if joint.type is not JointType.FIXED:
+            row = model.joint(joint.name).dofadr[0]
+            leader, slope = (joint.mimic.joint, joint.mimic.multiplier) if joint.mimic else (joint.name, 1.0)
+            E[row, robot.index(leader)] = slope
+            e[row] = joint.mimic.offset if joint.mimic else 0.0
+    q, v, a = rng.uniform(-1, 1, (3, robot.n))
+    data.qpos[:], data.qvel[:], data.qacc[:] = E @ q + e, E @ v, E @ a
+    mujoco.mj_forward(model, data)
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M)
+    scale = max(1.0, float(np.abs(M).max()))
+    assert np.abs(robot.mass_matrix(q) - E.T @ M @ E).max() < 1e-12 * scale
+    tau = E.T @ (M @ (E @ a) + data.qfrc_bias)
+    assert np.abs(robot.inverse_dynamics(q, v, a) - tau).max() < 1e-11 * max(1.0, np.abs(tau).max())
 
 
 def test_a_hand_equals_the_compiled_model(tmp_path: Path) -> None:
