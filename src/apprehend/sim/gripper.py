@@ -29,7 +29,8 @@ TOUCH = 0.5  # N on a pad that counts as felt
 FEELING_STEPS = 3  # steps in a row in which both pads must feel
 PUSH = 4.0  # N at most while closing: a free object is pushed between the pads, not knocked over
 PUSH_TIME = 0.1  # s in which a stopped jaw comes to push with that
-RAMP = 0.15  # s from touch to full force
+RAMP = 0.15  # s from touch to full force, and from full force to none before the jaws open
+START = 0.3  # m/s², with which a motion of the jaws begins: pads that leave at once would drag the object along
 STALL = 0.25  # s of standstill with less than both pads felt
 SAMPLES = 129  # of the path of the jaw
 
@@ -102,6 +103,8 @@ class Gripper:
         self._target = self.width(world)
         self._reference = self._target
         self._speed = 0.1
+        self._rate = 0.0  # present speed of the reference
+        self._fade = 0.0  # N/s with which a grip is let go of
         self._force = 0.0  # commanded
         self._pressed = 0.0  # present, on its way to the command
         self._push = 0.0
@@ -113,7 +116,10 @@ class Gripper:
 
     # --- commands ------------------------------------------------------------------------------------------------
     def move(self, world: World, width: float, *, speed: float = 0.1) -> None:
-        """Open or close to *width* (m) with *speed* (m/s between the pads), by position."""
+        """Open or close to *width* (m) with *speed* (m/s between the pads), by position.
+
+        A grip is first let go of: its force fades before the pads leave the object.
+        """
         low, high = self.jaw.min_width, self.jaw.max_width
         if not (low - 1e-6 <= width <= high + 1e-6):
             raise InputError(f"width is {width} m; these jaws reach {low:.4g} to {high:.4g} m")
@@ -121,7 +127,8 @@ class Gripper:
         self.state = JawState.MOVING
         self._target, self._speed = float(np.clip(width, low, high)), speed
         self._reference = self.width(world)
-        self._push = self._pressed = 0.0
+        self._fade = self._pressed / RAMP
+        self._rate = self._push = 0.0
 
     def close(self, world: World, force: float, *, speed: float = 0.05) -> None:
         """Close with *speed* until both pads feel the object, then press each pad with *force* (N)."""
@@ -212,11 +219,16 @@ class Gripper:
         dt = world.timestep
         damping = 0.3 * mass / dt  # takes 30 % of the velocity error per step
         if self.state in (JawState.MOVING, JawState.ARRIVED):
-            step = np.clip(self._target - self._reference, -self._speed * dt, self._speed * dt)
-            self._reference += float(step)
+            if self._pressed > 0.0:
+                self._pressed = max(0.0, self._pressed - self._fade * dt)
+                self._reference = width
+                return -self._pressed - damping * rate
+            self._rate = min(self._speed, self._rate + START * dt)
+            step = float(np.clip(self._target - self._reference, -self._rate * dt, self._rate * dt))
+            self._reference += step
             if abs(self._target - width) < 2e-4 and step == 0.0:
                 self.state = JawState.ARRIVED
-            wanted = self.bandwidth**2 * (self._reference - width) + 2.0 * self.bandwidth * (float(step) / dt - rate)
+            wanted = self.bandwidth**2 * (self._reference - width) + 2.0 * self.bandwidth * (step / dt - rate)
             limit = self.jaw.max_force
             return float(np.clip(mass * wanted, -limit, limit))
         if self.state in (JawState.CLOSING, JawState.EMPTY, JawState.BLOCKED):

@@ -21,8 +21,8 @@ class Physics:
 
     *softness* is the time constant of a contact's spring and damper in steps; two is the stiffest that the
     integrator allows. *impedance* are the shares of a contact's acceleration that the constraint takes over, at zero
-    and at full (*width*, in m) penetration. *rolling* is the coefficient of rolling friction in m: what stops
-    a round object on a table, as the flatness of a real contact does.
+    and at full (*width*, in m) penetration. *rolling* is the coefficient of rolling friction in m: the
+    offset of the normal force that stops a round object on a table, as the flattening of a real contact does.
     """
 
     timestep: float = 0.002
@@ -33,7 +33,7 @@ class Physics:
     iterations: int = 50
     noslip_iterations: int = 8
     noslip_tolerance: float = 1e-8
-    rolling: float = 1e-4
+    rolling: float = 5e-4
 
     def __post_init__(self) -> None:
         if not (1e-5 <= self.timestep <= 0.01):
