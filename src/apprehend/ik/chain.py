@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -16,6 +16,7 @@ from ..kernels.chain import PRISMATIC, ChainModel
 from ..kernels.ik_chain import IKChain
 from ..kernels.ik_seeds import chain_features, chain_targets
 from ..kinematics import Robot
+from .reach import ReachBound, reach_bound
 
 TABLE = 512
 """Configurations in the table of starts."""
@@ -37,6 +38,7 @@ class PreparedChain:
     unit: Array  # (k,) size of the kernels' unit of each coordinate: 1 rad, or the reach in metres
     lower: Array  # (k,) limits as the robot has them
     upper: Array
+    bound: ReachBound
     turns: Any  # (k,) bool: coordinates that may make a whole turn, and are solved without limits
 
     def targets(self, T: Array) -> Array:
@@ -62,6 +64,15 @@ class PreparedChain:
             value = np.where(value < lower, value + turn * np.ceil((lower - value) / turn), value)
             q[..., t] = np.clip(value, lower, upper)
         return q
+
+    def without_limits(self) -> PreparedChain:
+        """The same chain with all limits taken away (starts are still drawn from within them)."""
+        return self._wide
+
+    @cached_property
+    def _wide(self) -> PreparedChain:
+        k = self.free.size
+        return replace(self, program=self.program._replace(lower=np.full(k, -np.inf), upper=np.full(k, np.inf)))
 
     @cached_property
     def middle(self) -> Array:
@@ -164,7 +175,9 @@ def _build(model: ChainModel, lower: Array, upper: Array) -> PreparedChain:
         low=low / unit,
         high=high / unit,
     )
-    return PreparedChain(program, model.free, before, reach, unit, lower, upper, turns)
+    return PreparedChain(
+        program, model.free, before, reach, unit, lower, upper, reach_bound(model, lower, upper), turns
+    )
 
 
 def _box(lower: Array, upper: Array, sliding: Any, turns: Any, length: float) -> tuple[Array, Array]:

@@ -16,8 +16,11 @@ class IKStatus(Status):
     """How the search for one target ended."""
 
     SUCCESS = "a joint vector within the limits reaches the target within the tolerance"
-    OUT_OF_REACH = "no joint vector reaches the target: it is farther away than the chain is long (certified)"
-    NOT_FOUND = "no start led to the target; it may be out of reach, or need more starts"
+    OUT_OF_REACH = "no joint vector reaches the target"
+    LIMITS = "the target can be reached, but only outside the joint limits"
+    COLLISION = "the target is reached within the limits, but no solution found was accepted as free of collision"
+    SINGULAR = "the chain comes close, but is singular there: the tolerance is met slowly or not at all"
+    NOT_FOUND = "no start led to the target"
 
     @property
     def code(self) -> int:
@@ -34,9 +37,11 @@ _OBJECTS = np.array(_STATUSES, dtype=object)
 class IKResult(Result):
     """Solutions of `solve` for a batch of targets; leading dimensions are the targets'.
 
-    ``q (..., n)``, or ``(..., s, n)`` when s solutions were asked for (rows from ``found`` on repeat the first);
-    where nothing was found, q is the guess or the home position. ``residual (..., 2)`` is the distance in m and the
-    angle in rad between the target and the frame at the (first) q, by the robot's own forward kinematics.
+    ``q (..., n)``, or ``(..., s, n)`` when s solutions were asked for (rows from ``found`` on repeat the first).
+    Where nothing was found, q is the joint vector within the limits that comes nearest (least distance over the
+    chain's reach, squared, plus 2 − 2 cos of the angle), so that ``residual (..., 2)``, the distance in m and the
+    angle in rad between target and frame at the (first) q, says what is missing; ``limiting (..., n)`` are the joints
+    that are at a limit there.
     """
 
     q: Array
@@ -44,7 +49,10 @@ class IKResult(Result):
     residual: Array  # (..., 2)
     found: IntArray  # (...) distinct solutions
     starts: IntArray  # (...) starts used
-    facts: tuple[str, float, Array]  # frame, reach in m (no point is farther from the chain's origin), that origin
+    certified: BoolArray  # (...) out of reach by a bound that holds for every joint vector
+    limiting: BoolArray  # (..., n)
+    frame: str
+    joint_names: tuple[str, ...]
 
     @property
     def success(self) -> Any:
@@ -70,13 +78,22 @@ class IKResult(Result):
         if len(index) != self.codes.ndim:
             raise InputError(f"{len(index)} indices for a batch of shape {self.codes.shape}; give one per dimension")
         status = _STATUSES[int(self.codes[index])]
-        frame, reach, _ = self.facts
         distance, angle = self.residual[index]
+        name = f"{self.frame!r}"
+        nearest = f"the nearest pose found is {distance:.3g} m and {angle:.3g} rad away"
+        stuck = [joint for joint, at in zip(self.joint_names, self.limiting[index], strict=True) if at]
+        if stuck:
+            nearest += f", with {', '.join(stuck)} at a limit"
         if status is IKStatus.SUCCESS:
-            return f"{frame!r} reaches the target: off by {distance:.2g} m and {angle:.2g} rad"
+            return f"{name} reaches the target: off by {distance:.2g} m and {angle:.2g} rad"
         if status is IKStatus.OUT_OF_REACH:
-            return f"{frame!r} cannot reach the target: {status.value}; the chain is {reach:.4g} m long"
-        return f"{frame!r}: {status.value} ({int(self.starts[index])} starts were tried)"
+            proof = "certified by the lengths of the links" if self.certified[index] else "by search, limits apart"
+            return f"{name}: {status.value} ({proof}); {nearest}"
+        if status is IKStatus.COLLISION:
+            return f"{name}: {status.value} ({int(self.starts[index])} starts were tried)"
+        if status is IKStatus.NOT_FOUND:
+            return f"{name}: {status.value} ({int(self.starts[index])} were tried); {nearest}"
+        return f"{name}: {status.value}; {nearest}"
 
     def explain(self) -> str:
         """The reason for one target; for a batch, how many succeeded and the reason of the first that did not."""

@@ -154,7 +154,7 @@ def _parallel(g: Geometry, backwards: bool) -> Structure | None:
         return None
     o[4], o[5] = feet(h[4], o[4], h[5], o[5])
     gap = float(np.linalg.norm(o[5] - o[4]))
-    if 0.0 < gap < 1e-4 * reach:
+    if 0.0 < gap < (1e-7 if deviation < EXACT else 5e-3) * reach:
         o[4] = o[5] = 0.5 * (o[4] + o[5])
         deviation = max(deviation, gap / reach)
     return Structure(THREE_PARALLEL, Geometry(h, o, g.R0), backwards, deviation)

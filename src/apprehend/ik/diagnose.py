@@ -1,0 +1,74 @@
+"""Why a target was not reached, and the joint vector that comes nearest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array, BoolArray, IntArray
+from ..kernels.ik_nearest import nearest_poses
+from ..kernels.ik_seeds import nearest_starts
+from ..parallel import over_ranges
+from .chain import GROUPS, PreparedChain
+from .queue import Request, run
+from .result import IKStatus
+
+NEAREST_STARTS = 96
+NEAREST_STEPS = 120
+NEARLY = 100.0
+"""A nearest pose within this many tolerances is called singular: the descent crawls there, but has not ended."""
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """For each failed target: the status, the nearest kernel coordinates ``(F, k)``, and whether it is certified."""
+
+    codes: IntArray
+    x: Array
+    certified: BoolArray
+
+
+def diagnose(chain: PreparedChain, poses: Array, targets: Array, guesses: Array | None, request: Request) -> Diagnosis:
+    """Reasons for the targets ``(F, 12)`` (poses ``(F, 4, 4)``) that no start reached."""
+    count = targets.shape[0]
+    codes = np.full(count, IKStatus.NOT_FOUND.code, dtype=np.int64)
+    box = request.box
+    certified = np.zeros(count, dtype=bool)
+    if np.isfinite(box[:3]).all():
+        distance = float(np.linalg.norm(box[:3])) * chain.reach
+        certified = chain.bound.beyond(poses, distance, float(np.linalg.norm(box[3:])))
+    codes[certified] = IKStatus.OUT_OF_REACH.code
+    x, cost = nearest(chain, targets, guesses, request.seed)
+    open_ = np.flatnonzero(~certified)
+    if open_.size:
+        wide = chain.without_limits()
+        starts = min(request.starts, 60)
+        free = request.with_(starts=starts, wanted=1)
+        found = run(wide, targets[open_], None if guesses is None else guesses[open_], free)[1] > 0
+        codes[open_[found]] = IKStatus.LIMITS.code
+        rest = open_[~found]
+        if not request.partial:
+            codes[rest] = IKStatus.OUT_OF_REACH.code
+            crawling = cost[open_] <= 0.5 * (NEARLY * max(box[0], box[3])) ** 2
+            codes[open_[crawling]] = IKStatus.SINGULAR.code
+    return Diagnosis(codes, x, certified)
+
+
+def nearest(chain: PreparedChain, targets: Array, guesses: Array | None, seed: int) -> tuple[Array, Array]:
+    """Kernel coordinates ``(N, k)`` within the limits whose poses are nearest to the targets ``(N, 12)``; the costs."""
+    count, k = targets.shape[0], chain.free.size
+    table, weighted, half = chain.table
+    order = np.zeros((count, GROUPS), dtype=np.int64)
+    given = np.zeros((0, k)) if guesses is None else np.ascontiguousarray(guesses)
+    x = np.zeros((count, k))
+    cost = np.full(count, np.inf)
+
+    def work(first: int, last: int) -> None:
+        nearest_starts(weighted, half, targets, first, last, order)
+        nearest_poses(
+            chain.program, targets, first, last, given, table, order, seed, NEAREST_STARTS, NEAREST_STEPS, x, cost
+        )
+
+    over_ranges(work, count, 16)
+    return x, cost

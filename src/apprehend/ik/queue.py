@@ -1,0 +1,61 @@
+"""Targets through the kernels of the queue: what is asked for, and the call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array, IntArray
+from ..kernels.ik_queue import solve_queue, solve_wide
+from ..kernels.ik_seeds import nearest_starts
+from ..parallel import over_ranges
+from .chain import GROUPS, PreparedChain
+
+WIDE = 16
+"""Batches smaller than this give all lanes to one target after the other."""
+GRAIN = 128
+"""Smallest share of a batch that is worth a thread."""
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What is asked of every target, in the kernels' units."""
+
+    box: Array  # (6,) tolerances
+    partial: bool  # whether they differ from axis to axis
+    free_axis: int  # the one rotation axis that is free, or −1
+    wanted: int  # solutions
+    distinct: float
+    starts: int
+    seed: int
+
+    def with_(self, **changes: Any) -> Request:
+        """The same with some changes."""
+        return replace(self, **changes)
+
+
+def run(
+    chain: PreparedChain, targets: Array, guesses: Array | None, request: Request
+) -> tuple[Array, IntArray, IntArray]:
+    """Solutions ``(N, wanted, k)`` in kernel units, how many, and starts used, for target rows ``(N, 12)``."""
+    count, k = targets.shape[0], chain.free.size
+    out = np.zeros((count, request.wanted, k))
+    found = np.zeros(count, dtype=np.int64)
+    starts = np.zeros(count, dtype=np.int64)
+    table, weighted, half = chain.table
+    order = np.zeros((count, GROUPS), dtype=np.int64)
+    targets = np.ascontiguousarray(targets)
+    given = np.zeros((0, k)) if guesses is None else np.ascontiguousarray(guesses)
+    driver = solve_wide if count < WIDE else solve_queue
+
+    def work(first: int, last: int) -> None:
+        nearest_starts(weighted, half, targets, first, last, order)
+        driver(
+            chain.program, targets, first, last, given, table, order, request.seed, request.starts, request.box,
+            request.partial, request.free_axis, request.distinct, out, found, starts,
+        )  # fmt: skip
+
+    over_ranges(work, count, GRAIN)
+    return out, found, starts
