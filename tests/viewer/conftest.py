@@ -19,7 +19,7 @@ def make_episode(*, success: bool = True, recorded: bool = True) -> dict[str, An
     robot = Robot(load_description("ur5e"))
     time = np.linspace(0.0, 3.0, 181)
     q = robot.home + 0.3 * np.sin(time)[:, None] * np.ones(robot.n)
-    step = np.searchsorted([1.0, 2.0], time)
+    step = np.searchsorted([0.5, 1.0, 2.0], time)
     rows = np.tile([0.5, 0.1, 0.0, 1.0, 0.0, 0.0, 0.0], (len(time), 1))
     rows[:, 2] = np.clip(time - 1.0, 0.0, 0.1)
     rows[:, 1] += np.clip(time - 1.5, 0.0, 1.0) * 0.2
@@ -39,6 +39,7 @@ def make_episode(*, success: bool = True, recorded: bool = True) -> dict[str, An
         }
         for name, title, message in (
             ("plan", "Plan the grasp", "found <3> grasps & more"),
+            ("close", "Close until contact", "10 N"),
             ("lift", "Lift", "raised 100 mm"),
             ("place", "Set down", "done"),
         )

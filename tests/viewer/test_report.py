@@ -6,6 +6,7 @@ import base64
 import io
 import json
 import re
+from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -15,9 +16,10 @@ import pytest
 from PIL import Image as Pillow
 
 from apprehend.errors import InputError
-from apprehend.viewer import write_report
+from apprehend.viewer import report, write_report
 from apprehend.viewer.record import Record
 from apprehend.viewer.stage import body_poses, read
+from apprehend.viewer.studio import Contacts, Studio
 from tests.viewer.conftest import make_episode, on_disk
 
 VOID = {"meta", "img", "br", "line", "rect", "polyline"}
@@ -50,6 +52,14 @@ class Tree(HTMLParser):
         self.text += data
 
 
+@pytest.fixture(scope="module", autouse=True)
+def small_pictures() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("HERO", "FRAME", "CLOSE"):
+            patch.setattr(report, name, (240, 160))
+        yield
+
+
 @pytest.fixture(scope="module")
 def written(episode: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> str:
     target = tmp_path_factory.mktemp("report") / "below" / "report.html"
@@ -75,10 +85,22 @@ def test_nothing_is_loaded_from_anywhere(written: str) -> None:
 
 def test_pictures_are_inside_and_show_something(written: str) -> None:
     images = parsed(written).images
-    assert len(images) == 4  # the grasp, and three steps
+    assert len(images) == 7  # the scene, four steps, and two of the grasp
     shots = [np.asarray(Pillow.open(io.BytesIO(base64.b64decode(i.split(",")[1])))).astype(int) for i in images]
     assert all(shot.std() > 10 for shot in shots)
-    assert np.abs(shots[1] - shots[3]).mean() > 1.0  # the arm has moved
+    assert np.abs(shots[1] - shots[4]).mean() > 1.0  # the arm has moved
+
+
+def test_the_grasp_shows_its_friction_cones(written: str, episode: dict[str, Any]) -> None:
+    assert "µ = 0.5, half angle 26.6°" in parsed(written).text
+    record, stage = Record.of(episode), read(episode)[1]
+    contacts = Contacts.of(episode)
+    assert contacts is not None
+    bare = Contacts(contacts.points[:0], contacts.normals[:1], 0.5)
+    studio = Studio.of(stage, record)
+    shots = [studio.close_up("cube", c, 40, (200, 140), across=True).astype(int) for c in (contacts, bare)]
+    blue = [(shot[..., 2] > shot[..., 0] + 30).sum() for shot in shots]
+    assert blue[0] > 300 > blue[1]
 
 
 def test_text_is_escaped_and_complete(written: str) -> None:
@@ -149,9 +171,9 @@ def test_record_checks_shapes(episode: dict[str, Any]) -> None:
 
 def test_record_knows_when_each_step_was(episode: dict[str, Any]) -> None:
     record = Record.of(episode)
-    assert [b.label for b in record.bands] == ["Plan the grasp", "Lift", "Set down"]
-    assert record.bands[1].start == pytest.approx(1.0, abs=0.02)
-    assert record.bands[1].stop == pytest.approx(2.0, abs=0.02)
+    assert [b.label for b in record.bands] == ["Plan the grasp", "Close until contact", "Lift", "Set down"]
+    assert record.bands[2].start == pytest.approx(1.0, abs=0.02)
+    assert record.bands[2].stop == pytest.approx(2.0, abs=0.02)
     assert record.at(-1.0) == 0
     assert record.at(99.0) == 180
     assert np.isinf(record.limits["acceleration"]).sum() + np.isfinite(record.limits["acceleration"]).sum() == 6

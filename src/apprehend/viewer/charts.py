@@ -97,7 +97,12 @@ def _joint(record: Record, stage: Stage, joint: int) -> Chart:
     if np.isfinite(upper) and upper < high + 0.6 * span:
         high = max(high, upper + 0.08 * span)
     room = min(float(values.min()) - lower, upper - float(values.max()))
-    note = f"{room:.3g} {unit} from the nearest limit" if np.isfinite(room) else "no limits"
+    if not np.isfinite(room):
+        note = "no limits"
+    elif room < 0.0:
+        note = f"passes a limit by {-room:.2g} {unit}"
+    else:
+        note = f"{room:.3g} {unit} from the nearest limit"
     return Chart(
         name, unit, record.time, [Line(name, values, max(_shade(record, joint), 0))],
         limits=[(v, label) for v, label in ((lower, "lower limit"), (upper, "upper limit")) if np.isfinite(v)],

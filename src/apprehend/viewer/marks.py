@@ -35,6 +35,12 @@ def friction_cone(point: ArrayLike, normal: ArrayLike, friction: float, length: 
     return placed(mesh, along(-np.asarray(normal, dtype=np.float64), point))
 
 
+def ball(at: ArrayLike, radius: float) -> Mesh:
+    """A small ball at a point."""
+    vertices, faces = shapes.sphere(radius)
+    return vertices + np.asarray(at, dtype=np.float64), faces
+
+
 def arrow(start: ArrayLike, vector: ArrayLike, radius: float) -> Mesh:
     """An arrow from *start* along *vector*."""
     length = float(np.linalg.norm(np.asarray(vector, dtype=np.float64)))

@@ -109,17 +109,16 @@ def render(
 
     *focus* is the box (low, high) that matters: shadows are finest there, and without a *camera* one is placed that
     sees it; by default everything. *floor* lays a ground under the lowest point.
-    Items with an alpha below one are drawn over the rest, where they are in front.
+    Items with an alpha below one are drawn over the rest, where they are in front; those of one alpha hide each other.
     """
     width, height = size
     if not (16 <= width <= 8192 and 16 <= height <= 8192):
         raise InputError(f"size is {size}; expected (width, height) between 16 and 8192 pixels")
     if not items:
         raise InputError("there is nothing to draw: items is empty")
-    low, high = bounds(items)
-    ground = [_ground(low, high)] if floor else []
-    if focus is not None:
-        low, high = focus
+    everything = bounds(items)
+    low, high = everything if focus is None else focus
+    ground = [_ground(*everything)] if floor else []
     if camera is None:
         camera = Camera.around(corners_of(low, high), aspect=width / height)
     solid = [item for item in items if item.rgba[3] >= 1.0]
@@ -130,12 +129,12 @@ def render(
     backdrop = np.broadcast_to(backdrop, base.shape)
     image = np.where(np.isinf(depth)[..., None], backdrop, base)
     if floor:
-        image = _into_the_distance(image, depth, backdrop, camera, low, high)
-    for item in items:
-        if item.rgba[3] < 1.0:
-            over, over_depth = _layer([item], camera, size, light, shut_in=False)
-            front = over_depth < depth
-            image[front] = (1.0 - item.rgba[3]) * image[front] + item.rgba[3] * over[front]
+        image = _into_the_distance(image, depth, backdrop, camera, *everything)
+    for alpha in sorted({item.rgba[3] for item in items if item.rgba[3] < 1.0}, reverse=True):
+        group = [item for item in items if item.rgba[3] == alpha]
+        over, over_depth = _layer(group, camera, size, light, shut_in=False)
+        front = over_depth < depth
+        image[front] = (1.0 - alpha) * image[front] + alpha * over[front]
     small = np.empty((height, width, 3))
     parallel.over_ranges(lambda a, b: raster.average(image, SAMPLES, a, b, small), height, 16)
     return np.asarray(np.clip(_encoded(small) * 255.0 + 0.5, 0.0, 255.0), dtype=np.uint8)

@@ -14,11 +14,11 @@ from ..arrays import Array
 from ..errors import InputError
 from .charts import load_charts
 from .live import HOST, Announce, Page
-from .marks import friction_cone, tube
+from .marks import ball, friction_cone, tube
 from .plots import Chart
 from .record import Record
 from .stage import Stage, read
-from .studio import Studio
+from .studio import Contacts, Studio
 from .words import number, quantity
 
 if TYPE_CHECKING:
@@ -122,20 +122,17 @@ class Player:
         """Goal, contacts with their cones, and the object's way: each can be hidden."""
         scene, gui, body = self.page.server.scene, self._shown, (data["scene"].get("goal") or {}).get("body")
         groups: dict[str, list[Any]] = {}
-        plan: Mapping[str, Any] = next((s for s in data["steps"] if s["name"] == "plan"), {"outputs": {}})["outputs"]
-        if body is not None and plan.get("contacts") and plan.get("normals"):
-            friction = float(data["inputs"].get("friction") or 0.6)
+        contacts = Contacts.of(data)
+        if body is not None and contacts is not None:
+            label = f"contacts and friction cones (µ = {contacts.friction:g})"
             size = 0.35 * float(np.ptp(next(t.vertices for t in stage.bodies if t.name == body), axis=0).max())
-            for i, (point, normal) in enumerate(zip(plan["contacts"], plan["normals"])):
-                cone = friction_cone(point, normal, friction, size)
-                groups.setdefault(f"contacts and friction cones (µ = {friction:g})", []).append(
-                    self.page.mesh(f"/bodies/{body}/cone{i}", *cone, (0.16, 0.45, 0.80, 0.35))
-                )
-                groups[f"contacts and friction cones (µ = {friction:g})"].append(
-                    scene.add_icosphere(
-                        f"/bodies/{body}/contact{i}", radius=0.04 * size, color=(20, 60, 140), position=point
-                    )
-                )
+            groups[label] = []
+            for i, (point, normal) in enumerate(zip(contacts.points, contacts.normals)):
+                cone = friction_cone(point, normal, contacts.friction, size)
+                groups[label] += [
+                    self.page.mesh(f"/bodies/{body}/cone{i}", *cone, (0.16, 0.45, 0.80, 0.35)),
+                    self.page.mesh(f"/bodies/{body}/contact{i}", *ball(point, 0.04 * size), (0.05, 0.15, 0.45, 1.0)),
+                ]
         if (
             body is not None
             and body in self.record.bodies

@@ -18,14 +18,14 @@ from .picture import Image, jpeg
 from .plots import Chart, legend, svg
 from .record import Record
 from .stage import Stage, read
-from .studio import Studio
+from .studio import Contacts, Studio
 from .style import CSS, SCRIPT
 from .words import number, quantity
 
 if TYPE_CHECKING:
     from ..process import Episode
 
-HERO, FRAME = (1020, 700), (500, 356)
+HERO, FRAME, CLOSE = (1020, 700), (500, 356), (720, 480)
 """Sizes of the pictures in pixels."""
 FRAMES = 8
 """Most pictures in the film strip."""
@@ -52,6 +52,7 @@ def page(data: Mapping[str, Any], stage: Stage) -> str:
         _head(data),
         f'<div class="top">{_hero(studio, data)}<div class="tiles">{_tiles(data, record)}</div></div>',
         _film(studio),
+        _grasp(studio, data),
         _steps(data["steps"]),
         _charts(charts),
         _inputs(data),
@@ -100,6 +101,22 @@ def _film(studio: Studio) -> str:
         caption = f"<b>{html.escape(band.label)}</b>, until {band.stop:.2f} s"
         shots.append(_figure(studio.shot(record.at(band.stop), FRAME), caption))
     return f'<h2>What happened</h2><div class="film">{"".join(shots)}</div>'
+
+
+def _grasp(studio: Studio, data: Mapping[str, Any]) -> str:
+    """The object in the closed hand from two sides, with what is known of the contacts."""
+    record, body, contacts = studio.record, (data["scene"].get("goal") or {}).get("body"), Contacts.of(data)
+    closed = [i for i, s in enumerate(data["steps"]) if s["name"] == "close" and s["status"] == "success"]
+    if record is None or contacts is None or body is None or body not in record.bodies or not closed:
+        return ""
+    samples = np.flatnonzero(record.step == closed[-1])
+    if not len(samples):
+        return ""
+    sample, half = int(samples[-1]), math.degrees(math.atan(contacts.friction))
+    cones = f"The planned contacts and their friction cones: µ = {contacts.friction:g}, half angle {half:.1f}°"
+    shots = _figure(studio.close_up(body, contacts, sample, CLOSE, across=True), cones)
+    shots += _figure(studio.close_up(body, contacts, sample, CLOSE, across=False), "Along the line on which it closes")
+    return f'<h2>The grasp</h2><div class="pair">{shots}</div>'
 
 
 def _figure(image: Image, caption: str) -> str:
@@ -185,7 +202,7 @@ def _card(index: int, chart: Chart, width: int, height: int, wide: bool) -> str:
     rest = html.escape(chart.note, quote=True)
     unit = f' <span class="soft">in {html.escape(chart.unit)}</span>' if chart.unit else ""
     return (
-        f'<section class="card"><header><h3>{html.escape(chart.title)}{unit}</h3>'
+        f'<section class="card"><header class="{"wide" if wide else "small"}"><h3>{html.escape(chart.title)}{unit}</h3>'
         f'<span class="readout" data-chart="{index}" data-rest="{rest}">{rest}</span></header>'
         f"{legend(chart) if wide else ''}{svg(chart, width, height, labels=wide)}</section>"
     )

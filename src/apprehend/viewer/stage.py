@@ -94,7 +94,12 @@ class Stage:
         return cls(robot, link_parts(robot.description) if robot else {}, tuple(bodies), tuple(boxes), tuple(ghosts))
 
     def items(
-        self, q: Array | None = None, poses: Mapping[str, Array] | None = None, *, ghosts: bool = True
+        self,
+        q: Array | None = None,
+        poses: Mapping[str, Array] | None = None,
+        *,
+        ghosts: bool = True,
+        robot_alpha: float = 1.0,
     ) -> list[Item]:
         """Everything as it is when the robot is at *q* and the bodies at *poses* (others stay where they started)."""
         items = []
@@ -102,7 +107,8 @@ class Stage:
             frames = self.robot.fk(self.robot.home if q is None else q)
             for name, T in zip(self.robot.frame_names, frames):
                 items += [
-                    Item(p.vertices, p.faces, T, p.rgba, gloss=0.5, normals=p.normals) for p in self.links.get(name, ())
+                    Item(p.vertices, p.faces, T, (*p.rgba[:3], robot_alpha), gloss=0.5, normals=p.normals)
+                    for p in self.links.get(name, ())
                 ]
         for t in self.bodies:
             items.append(Item(t.vertices, t.faces, (poses or {}).get(t.name, t.pose), t.rgba, normals=t.normals))

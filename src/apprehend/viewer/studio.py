@@ -3,14 +3,36 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Array
+from .marks import ball, friction_cone
 from .picture import Camera, Image, Item, render
 from .record import Record
 from .stage import Stage
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Where the fingers touch, in the body's frame: points and inward normals ``(k, 3)``, and the friction µ."""
+
+    points: Array
+    normals: Array
+    friction: float
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> Contacts | None:
+        """The contacts that the last step with contacts among its outputs names; None if there are none."""
+        for step in reversed(data["steps"]):
+            outputs = step.get("outputs", {})
+            points, normals = (np.asarray(outputs.get(k) or [], dtype=np.float64) for k in ("contacts", "normals"))
+            if points.size and points.shape == normals.shape and points.shape[1:] == (3,):
+                return cls(points, normals, float(data["inputs"].get("friction") or 0.6))
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,3 +77,29 @@ class Studio:
         return Camera.around(
             self.seen, azimuth=self.azimuth, elevation=math.radians(20.0), aspect=size[0] / size[1], margin=1.12
         )
+
+    def close_up(self, body: str, contacts: Contacts, moment: int, size: tuple[int, int], *, across: bool) -> Image:
+        """The object in the hand, the hand see-through, with the friction cones of its *contacts*.
+
+        The camera looks *across* the line on which the hand closes, or along it, whichever side is nearer to the
+        camera of the other pictures.
+        """
+        assert self.record is not None
+        T = self.record.poses(moment)[body]
+        items = self.stage.items(self.record.q[moment], self.record.poses(moment), ghosts=False, robot_alpha=0.45)
+        thing = next(t for t in self.stage.bodies if t.name == body)
+        reach = 0.3 * float(np.ptp(thing.vertices, axis=0).max())
+        seen = [thing.vertices]
+        for point, normal in zip(contacts.points, contacts.normals):
+            cone = friction_cone(point, normal, contacts.friction, reach)
+            items.append(Item(*cone, pose=T, rgba=(0.10, 0.42, 0.85, 0.6), gloss=0.0, shadow=False))
+            items.append(Item(*ball(point, 0.05 * reach), pose=T, rgba=(0.05, 0.15, 0.45, 1.0), shadow=False))
+            seen.append(cone[0])
+        closing = T[:3, :3] @ contacts.normals[0]
+        bearing = math.atan2(closing[1], closing[0]) + (0.5 * math.pi if across else 0.0)
+        azimuth = min((bearing, bearing + math.pi), key=lambda a: -math.cos(a - self.azimuth))
+        points = np.vstack(seen) @ T[:3, :3].T + T[:3, 3]
+        camera = Camera.around(
+            points, azimuth=azimuth, elevation=math.radians(26.0), aspect=size[0] / size[1], margin=1.25
+        )
+        return render(items, camera, size=size, focus=(points.min(axis=0), points.max(axis=0)))

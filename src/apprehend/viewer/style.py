@@ -44,6 +44,8 @@ details summary { cursor:pointer; color:var(--soft); font-size:13px; } details d
 .charts, .joints { display:grid; gap:14px; } .joints { grid-template-columns:repeat(auto-fill,minmax(300px,1fr)); }
 td.margins { min-width:200px; } td.margins dd { white-space:nowrap; }
 .card header { display:flex; justify-content:space-between; gap:10px; align-items:baseline; flex-wrap:wrap; }
+.card header.small { display:block; } .card header.small .readout { display:block; }
+.pair { display:grid; grid-template-columns:repeat(auto-fit,minmax(320px,1fr)); gap:16px; }
 .card header span { color:var(--soft); font-size:13px; font-variant-numeric:tabular-nums; }
 svg.chart { display:block; width:100%; height:auto; overflow:visible; }
 svg text { font-size:11px; fill:var(--soft); font-family:inherit; font-variant-numeric:tabular-nums; }
