@@ -3,13 +3,18 @@
 from .candidates import Candidate, GraspPlan, PlanStatus
 from .closure import Closure, ClosureStatus, closed
 from .contact import Contact, ContactModel
+from .files import read_grasp
 from .forces import ContactForces, ForceBatch, ForceStatus, Limits
 from .grasp import Grasp
+from .hand_grasp import HandGrasp, hand_jacobian
 from .jaw_plan import plan
+from .picture import save_picture
+from .push import Push
 from .quality import Quality
 from .surface import Surface
 
 __all__ = [
     "Candidate", "Closure", "ClosureStatus", "Contact", "ContactForces", "ContactModel", "ForceBatch", "ForceStatus",
-    "Grasp", "GraspPlan", "Limits", "PlanStatus", "Quality", "Surface", "closed", "plan",
+    "Grasp", "GraspPlan", "HandGrasp", "Limits", "PlanStatus", "Push", "Quality", "Surface", "closed", "hand_jacobian",
+    "plan", "read_grasp", "save_picture",
 ]  # fmt: skip

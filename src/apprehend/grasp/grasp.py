@@ -17,6 +17,7 @@ from .closure import Closure, force_closure, form_closure
 from .contact import Contact, ContactModel
 from .forces import ContactForces, ForceBatch, Limits, contact_forces
 from .program import ContactCone, contact_cone
+from .push import Push, largest_force
 from .quality import Quality, measure
 
 RANK_TOLERANCE = 1e-9
@@ -243,6 +244,10 @@ class Grasp:
     ) -> ContactForces | ForceBatch:
         """Contact forces that balance an external wrench: see `forces.contact_forces`."""
         return contact_forces(self, wrench, objective, limits, **options)
+
+    def largest_force(self, direction: ArrayLike, limits: Limits, **options: Any) -> Push:
+        """The largest force along a direction, or within a cone of directions: see `push.largest_force`."""
+        return largest_force(self, direction, limits, **options)
 
     # making
 

@@ -17,6 +17,7 @@ from ..parallel import over_ranges
 from . import shape
 from .candidates import Candidate, GraspPlan, PlanStatus
 from .contact import Contact
+from .grasp import Grasp
 from .hold import pressing_force
 from .jaw_settings import Settings, checked, directions, half_spaces
 from .pairs import Pairs, antipodal
@@ -75,8 +76,9 @@ def plan(
     The quality is the product of four parts, each in [0, 1], with exponents `WEIGHTS`: *cone*, the cone margin over
     arctan µ; *force*, ``1 − required / max_force``; *centre*, ``1 / (1 + (2 d / r)²)`` with d the distance of the
     centre of mass from the closing line and r the body's radius; *coverage*, the square root of the share of the
-    smaller patch in its pad. ``margins`` holds ``cone`` (rad), ``force`` (N), ``com_distance`` (m), ``coverage``,
-    ``torsion`` (γ in m) and the quality's four parts.
+    smaller patch in its pad. ``margins`` holds ``epsilon`` (certified lower bound, L1, exact cones, torques
+    over the body's radius), ``cone`` (rad), ``force`` (N), ``com_distance`` (m), ``coverage``, ``torsion`` (γ in m) and
+    the quality's four parts.
 
     γ of a contact is µ times the mean distance of its patch from the patch's middle (even pressure), at least the
     body's `torsional_friction`. The answer is the same for the same state of *rng*. Raises `InputError` for arguments
@@ -380,7 +382,10 @@ class _Search:
         width = float(np.clip(found.width[i], self.jaw.min_width, self.jaw.max_width))
         force = float(found.force[i])
         alpha = float(np.arctan(self.s.friction))
+        contacts = (self._contact(found, i, 0), self._contact(found, i, 1))
+        closure = Grasp(contacts, reference=self.body.com, length=self.body.radius)
         margins = {
+            "epsilon": closure.quality(gap=0.05).lower,
             "cone": float(found.margin[i]), "force": self.s.max_force - force,
             "com_distance": float(found.away[i]), "coverage": float(found.coverage[i]),
             "torsion": float(found.torsion[i].min()),
@@ -394,7 +399,7 @@ class _Search:
             tcp=found.tcp[i].copy(),
             width=width,
             opening=float(found.opening[i]),
-            contacts=(self._contact(found, i, 0), self._contact(found, i, 1)),
+            contacts=contacts,
             quality=float(found.quality[i]),
             margins=margins,
             required_force=force,

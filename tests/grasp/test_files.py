@@ -1,0 +1,101 @@
+"""Contacts from files, pictures, and the commands on top."""
+
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from apprehend.errors import InputError
+from apprehend.grasp import read_grasp, save_picture
+
+PAIR = {
+    "contacts": [
+        {"position": [0.05, 0, 0], "normal": [-1, 0, 0], "model": "soft", "torsion": 0.01, "friction": 0.5},
+        {"position": [-0.05, 0, 0], "normal": [1, 0, 0], "model": "soft", "torsion": 0.01, "friction": 0.5},
+    ],
+    "length": 0.05,
+}
+
+
+def written(tmp_path, data, name="grasp.json"):
+    path = tmp_path / name
+    path.write_text(data if isinstance(data, str) else json.dumps(data))
+    return path
+
+
+def test_json_and_csv_say_the_same(tmp_path):
+    table = "x,y,z,nx,ny,nz,friction,model,torsion\n0.05,0,0,-2,0,0,0.5,soft,0.01\n-0.05,0,0,1,0,0,,,\n"
+    a = read_grasp(written(tmp_path, PAIR))
+    b = read_grasp(written(tmp_path, table, "grasp.csv"), friction=0.5, model="soft", torsion=0.01)
+    np.testing.assert_allclose(a.matrix, b.matrix)
+    assert a.length == 0.05
+    assert [c.model for c in a.contacts] == [c.model for c in b.contacts]
+
+
+def test_a_body_beside_the_file_gives_reference_and_length(tmp_path):
+    import apprehend as ap
+
+    body = ap.Body.box((0.1, 0.06, 0.04), mass=0.2)
+    body.save(tmp_path / "box.obj")
+    grasp = read_grasp(written(tmp_path, {**PAIR, "length": None, "body": "box.obj", "mass": 0.2}))
+    assert grasp.length == pytest.approx(body.radius)
+
+
+@pytest.mark.parametrize(
+    ("data", "name", "message"),
+    [
+        ("{", "a.json", r"a\.json:1: not JSON"),
+        ("[]", "a.json", 'list "contacts"'),
+        ({"contacts": [{"position": [0, 0, 0]}]}, "a.json", 'contact 0: expected an object with "position"'),
+        ({"contacts": [{**PAIR["contacts"][0], "mu": 1}]}, "a.json", "unknown field 'mu'"),
+        ({"contacts": [{**PAIR["contacts"][0], "friction": -1}]}, "a.json", "contact 0: contact friction is -1"),
+        ({"contacts": [{**PAIR["contacts"][0], "normal": "up"}]}, "a.json", "contact 0: "),
+        ("x,y,z\n1,2,3\n", "a.csv", "no column nx, ny, nz"),
+        ("x,y,z,nx,ny,nz\n1,2,3,0,0,one\n", "a.csv", r"a\.csv:2: could not convert"),
+        ("x", "a.txt", r"neither \.json nor \.csv"),
+    ],
+)
+def test_bad_files_are_named(tmp_path, data, name, message):
+    with pytest.raises(InputError, match=message):
+        read_grasp(written(tmp_path, data, name))
+
+
+def test_missing_file_is_named(tmp_path):
+    with pytest.raises(InputError, match="No such file"):
+        read_grasp(tmp_path / "nowhere.json")
+
+
+def test_picture(tmp_path):
+    pytest.importorskip("matplotlib")
+    grasp = read_grasp(written(tmp_path, PAIR))
+    forces = grasp.contact_forces([0, 0, -1.0, 0, 0, 0]).forces
+    path = save_picture(grasp, tmp_path / "grasp.png", forces)
+    assert path.read_bytes()[:4] == b"\x89PNG"
+    with pytest.raises(InputError, match="not a picture's name"):
+        save_picture(grasp, tmp_path / "grasp.txt")
+
+
+def apprehend(*arguments):
+    code = "from apprehend.cli import main; main()"
+    return subprocess.run([sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True)
+
+
+def test_commands(tmp_path):
+    path = written(tmp_path, PAIR)
+    shown = apprehend("grasp", "check", path, "--json")
+    assert shown.returncode == 0, shown.stderr
+    answer = json.loads(shown.stdout)
+    assert answer["force_closure"]["closed"]
+    assert not answer["form_closure"]["closed"]
+    held = apprehend("forces", path, "--wrench", "0,0,-10,0,0,0", "--json")
+    assert json.loads(held.stdout)["value"] == pytest.approx(20.0)
+    weak = apprehend("forces", path, "--wrench", "0,0,-10,0,0,0", "--normal", "5")
+    assert weak.returncode == 1
+    assert "no contact forces" in weak.stdout
+    wrong = apprehend("forces", path, "--wrench", "up")
+    assert wrong.returncode == 2
+    assert re.search("--wrench 'up' is not a list", wrong.stderr)
+    assert "Traceback" not in wrong.stderr
