@@ -33,7 +33,7 @@ def check(
     picture: Picture = None,
     as_json: Json = False,
 ) -> int:
-    """Closure with its proof, and the standard qualities. Exit code 0: force closure; 1: none; 2: the input is wrong."""
+    """Closure with its proof, and the standard qualities. Exit code 0: force closure; 1: none; 2: wrong input."""
     from ..grasp import read_grasp, save_picture
 
     grasp = read_grasp(file, friction=friction, model=model, torsion=torsion)
@@ -87,7 +87,7 @@ def forces(
     picture: Picture = None,
     as_json: Json = False,
 ) -> int:
-    """Optimal contact forces against a wrench. Exit code 0: found; 1: none exist, with a proof; 2: the input is wrong."""
+    """Optimal contact forces against a wrench. Exit code 0: found; 1: none exist, with a proof; 2: wrong input."""
     import numpy as np
 
     from ..errors import InputError
