@@ -126,26 +126,52 @@ def test_a_hand_within_an_arm_is_the_hand_alone() -> None:
 def test_a_hand_attached_to_an_arm() -> None:
     arm = Robot.load("ur5e").attach(Robot.load("robotiq_2f_85"), "tool0", prefix="hand_")
     hand = Hand.within(arm)
-    assert hand.root == "hand_base_link_inertia"
+    assert hand.root == "hand_base_link"
     assert hand.indices_in(arm).tolist() == [6]
-    named = Hand.within(arm, "hand_base_link")
+    named = Hand.within(arm, "hand_base_link_inertia")
     alone = Hand.load("robotiq_2f_85")
-    assert np.allclose(named.jaw.tcp_at(0.05), alone.jaw.tcp_at(0.05), atol=1e-9)
+    assert np.allclose(hand.jaw.tcp_at(0.05), alone.jaw.tcp_at(0.05), atol=1e-9)
     q = np.concatenate([arm.home[:6], hand.jaw.q_at(0.05)])
     through = [arm.fk(q, h.root) @ h.jaw.tcp_at(0.05) for h in (hand, named)]
     assert np.allclose(through[0][:3, 3], through[1][:3, 3], atol=1e-3)
 
 
-@pytest.mark.parametrize("name", ["pr2_gripper", "z1", "so101"])
-def test_other_jaws_are_found(name: str) -> None:
-    roots = {"z1": "gripperStator", "so101": "gripper_link"}
-    hand = Hand.within(load(name).robot, roots.get(name, load(name).root))
+@pytest.mark.parametrize(
+    ("name", "root", "pads"),
+    [
+        ("pr2_gripper", "r_gripper_palm_link", {"r_gripper_l_finger_tip_link", "r_gripper_r_finger_tip_link"}),
+        ("z1", None, {"gripperMover", "gripperStator"}),
+        ("so101", None, {"moving_jaw_so101_v1_link", "gripper_link"}),
+        ("baxter", "left_gripper_base_link", {"l_gripper_l_finger_tip", "l_gripper_r_finger_tip"}),
+        (
+            "tiago_pro",
+            "gripper_left_base_link",
+            {"gripper_left_fingertip_right_link", "gripper_left_fingertip_left_link"},
+        ),
+    ],
+)
+def test_other_jaws_are_found(name: str, root: str | None, pads: set[str]) -> None:
+    hand = Hand.within(load(name).robot, root)
     lawful(hand.jaw)
+    assert set(hand.jaw.pad_links) == pads
     assert 0.05 < hand.jaw.max_width < 0.12
 
 
+def test_fingers_that_meet_at_their_bases_grip_with_the_larger_faces_beyond() -> None:
+    foot = box("0.02 0.03 0.02", "0 {side}0.015 0.04") + box("0.02 0.01 0.08", "0 {side}0.015 0.08")
+    text = f"""<robot name="r"><link name="palm">{box("0.1 0.1 0.02", "0 0 0")}</link>
+<link name="a">{foot.format(side="")}</link><link name="b">{foot.format(side="-")}</link>
+<joint name="i" type="prismatic"><parent link="palm"/><child link="a"/><axis xyz="0 1 0"/>
+<limit lower="0" upper="0.02"/></joint><joint name="j" type="prismatic"><parent link="palm"/><child link="b"/>
+<axis xyz="0 -1 0"/><limit lower="0" upper="0.02"/><mimic joint="i"/></joint></robot>"""
+    jaw = Hand(Robot(parse_urdf(text))).jaw
+    lawful(jaw)
+    assert (jaw.min_width, jaw.max_width) == pytest.approx((0.02, 0.06), abs=1e-5)
+    assert jaw.pad_size == pytest.approx((0.02, 0.07), abs=1e-3)
+
+
 def test_so101_tcp_is_at_its_own_frame() -> None:
-    hand = Hand.within(load("so101").robot, "gripper_link")
+    hand = Hand.within(load("so101").robot)
     frame = hand.robot.fk(hand.robot.home, "gripper_frame_link")[:3, 3]
     assert np.abs(hand.jaw.tcp_at(hand.jaw.min_width)[:3, 3] - frame).max() < 3e-3
 

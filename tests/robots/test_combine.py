@@ -47,6 +47,14 @@ def test_attach_keeps_what_may_touch_and_repairs() -> None:
     assert d.home["h_finger_joint"] == 0.0
 
 
+def test_what_has_fingers_is_the_hand() -> None:
+    assert attach(arm(), gripper(), "c", prefix="x_").hand == "x_p"
+    assert attach(arm(), arm(), "c", prefix="x_").hand == ""
+    both = attach(arm(), attach(arm(), gripper(), "c"), "a", prefix="y_")
+    assert both.hand == "y_p"
+    assert without(both, "y_p").hand == ""
+
+
 def test_two_of_the_same_need_prefixes() -> None:
     both = attach(arm(), gripper(), "c")
     with pytest.raises(InputError, match=r"both have the links 'f', 'g', 'p'; attach with prefix='gripper_'"):

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..errors import ApprehendError, DescriptionError, unknown_name
+from ..robots.branches import divide
 from ..robots.combine import subtree
 from ..robots.description import Description, Joint, JointType
 from ..robots.meshes import link_surface
@@ -52,12 +53,13 @@ class Hand:
     def within(cls, robot: Robot, root_link: str | None = None) -> Self:
         """The hand that is part of *robot*: all that link *root_link* carries.
 
-        Without *root_link*: the first link after a serial chain of moving joints at which the tree divides into two or
-        more moving branches. Raises `DescriptionError` where there is no such link, or several arms.
+        Without *root_link*: the link that the description names (the root of an attached hand, say); else the first
+        link after a serial chain of moving joints at which the tree divides into two or more moving branches. Raises
+        `DescriptionError` where there is no such link, or several arms.
         """
         description = robot.description
         if root_link is None:
-            root_link = _end_of_arm(description)
+            root_link = description.hand or _end_of_arm(description)
         elif root_link not in description.links:
             unknown_name("link", root_link, description.links, f"robot {robot.name!r}")
         return cls(Robot(subtree(description, root_link)))
@@ -74,13 +76,13 @@ class Hand:
     @cached_property
     def palm(self) -> str:
         """The link from which the fingers branch."""
-        return _divide(self.robot.description)[0]
+        return divide(self.robot.description)[0]
 
     @cached_property
     def fingers(self) -> tuple[Finger, ...]:
         """The fingers, in the order of the description; of a jaw, the two links with the pads and what drives them."""
         description = self.robot.description
-        branches = _divide(description)[1]
+        branches = divide(description)[1]
         found = [_finger(self.robot, description, joint) for joint in branches]
         if self.is_jaw:
             tips = self.jaw.pad_links
@@ -105,34 +107,8 @@ class Hand:
         return f"<Hand {self.name!r}: {self.n} coordinates, palm {self.palm!r}>"
 
 
-def _moving_children(description: Description) -> dict[str, list[Joint]]:
-    """For every link, the joints to children below which something moves (the joint itself included)."""
-    moves: set[str] = set()
-    children: dict[str, list[Joint]] = {name: [] for name in description.links}
-    for joint in reversed(description.joints):
-        if joint.type is not JointType.FIXED or joint.child in moves:
-            moves.add(joint.parent)
-            children[joint.parent].insert(0, joint)
-    return children
-
-
-def _divide(description: Description, start: str | None = None) -> tuple[str, list[Joint], int]:
-    """The first link with two or more moving branches (or the last before the only one), and the joints passed."""
-    children = _moving_children(description)
-    link, passed = start or description.root, 0
-    last = link
-    while len(children[link]) == 1:
-        joint = children[link][0]
-        last = link
-        passed += joint.type is not JointType.FIXED
-        link = joint.child
-    if not children[link]:
-        return last, children[last], passed
-    return link, children[link], passed
-
-
 def _end_of_arm(description: Description) -> str:
-    link, branches, passed = _divide(description)
+    link, branches, passed = divide(description)
     if len(branches) < 2:
         raise DescriptionError(
             f"robot {description.name!r} is one serial chain: no hand was found at its end; pass root_link= the base "

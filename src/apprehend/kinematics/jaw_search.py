@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, BoolArray
 from ..errors import DescriptionError
 from ..robots.description import JointType
 from ..robots.meshes import link_surface
@@ -258,26 +258,46 @@ class _Patch:
 
 
 def _pads(surfaces: _Surfaces, q: Array, R: Array, front: frozenset[str], back: frozenset[str]) -> _Patch | None:
-    grid, gap, face_a, face_b = _gap_on_lines(surfaces, q, R, front, back, 0.5e-3)
-    smallest = float(gap.min())
-    if not np.isfinite(smallest):
+    """Where the gap is smallest; or, where fingers meet at their bases first, the larger faces beyond."""
+    lines = _gap_on_lines(surfaces, q, R, front, back, 0.5e-3)
+    grid, gap = lines[0], lines[1]
+    if not np.isfinite(gap).any():
         return None
-    mask = largest_patch(gap <= smallest + PAD_TOLERANCE)
+    mask = largest_patch(gap <= gap.min() + PAD_TOLERANCE)
+    patch = _patch(surfaces, q, R, (front, back), lines, mask)
+    y, z = grid.centres()
+    distal = np.tensordot(R[1:] @ _approach(surfaces, q, R, patch), np.stack([y, z]), axes=1)
+    beyond = np.isfinite(gap) & (distal > distal[mask].max())
+    if beyond.any():
+        further = largest_patch(beyond & (gap <= gap[beyond].min() + PAD_TOLERANCE))
+        if further.sum() > 2 * mask.sum():
+            return _patch(surfaces, q, R, (front, back), lines, further)
+    return patch
+
+
+def _patch(
+    surfaces: _Surfaces,
+    q: Array,
+    R: Array,
+    groups: tuple[frozenset[str], frozenset[str]],
+    lines: tuple[Grid, Array, Array, Array],
+    mask: BoolArray,
+) -> _Patch:
+    """The pads on the *lines* chosen by *mask*: middle, extents, and the links that most lines end on."""
+    grid, _, *faces = lines
     y, z = grid.centres()
     low = np.array([y[mask].min(), z[mask].min()]) - 0.5 * grid.cell
     high = np.array([y[mask].max(), z[mask].max()]) + 0.5 * grid.cell
     middle = 0.5 * (low + high)
     nearest = np.argmin(np.where(mask, (y - middle[0]) ** 2 + (z - middle[1]) ** 2, np.inf))
     links, centres = [], []
-    for face, group, front_side in ((face_a, front, True), (face_b, back, False)):
-        x = float(face.ravel()[nearest])
+    for side, (face, group) in enumerate(zip(faces, groups, strict=True)):
         hits = {}
         for link in group:
-            lo, hi = extent_along_lines(surfaces.placed(q, {link}, R), grid)
-            own = lo if front_side else hi
+            own = extent_along_lines(surfaces.placed(q, {link}, R), grid)[side]
             hits[link] = int((np.abs(own[mask] - face[mask]) < 1e-6).sum())
         links.append(max(hits, key=lambda n: hits[n]))
-        centres.append([x, *middle])
+        centres.append([float(face.ravel()[nearest]), *middle])
     poses = [surfaces.robot.fk(q, link) for link in links]
     points = [T[:3, :3].T @ (R.T @ c - T[:3, 3]) for T, c in zip(poses, centres, strict=True)]
     return _Patch(np.array(centres), low, high, (links[0], links[1]), np.array(points))

@@ -36,6 +36,7 @@ class Entry:
     root: str = ""
     without: str = ""
     like: str = ""
+    hand: str = ""
     tool: str = ""
     incomplete: str = ""
     inertias: str = ""
@@ -112,14 +113,17 @@ def applied(entry: Entry, description: Description) -> Description:
     unknown = entry.home.keys() - home.keys()
     if unknown and not entry.like:
         raise DescriptionError(f"catalogue entry {entry.name!r}: home names unknown joints {sorted(unknown)}")
-    if entry.tool and entry.tool not in description.links:
-        raise DescriptionError(f"catalogue entry {entry.name!r}: the tool frame {entry.tool!r} does not exist")
+    for what, link in (("tool frame", entry.tool), ("base link of the hand", entry.hand)):
+        if link and link not in description.links and not entry.like:
+            raise DescriptionError(f"catalogue entry {entry.name!r}: the {what} {link!r} does not exist")
+    hand, tool = (link if link in description.links else "" for link in (entry.hand, entry.tool))
     return replace(
         description,
         name=entry.name,
         joints=tuple(joints),
         home={**description.home, **home},
-        tool=entry.tool or description.tool,
+        hand=hand or description.hand,
+        tool=tool or description.tool,
         repairs=tuple(repairs),
     )
 

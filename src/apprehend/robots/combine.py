@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import as_pose
 from ..errors import InputError, unknown_name
+from .branches import divide
 from .description import Description, Joint, JointType, Mimic
 from .poses import motion
 
@@ -42,6 +43,7 @@ def renamed(description: Description, prefix: str) -> Description:
             replace(loop, name=prefix + loop.name, first=prefix + loop.first, second=prefix + loop.second)
             for loop in description.loops
         ),
+        hand=prefix + description.hand if description.hand else "",
         tool=prefix + description.tool if description.tool else "",
     )
 
@@ -51,7 +53,8 @@ def attach(
 ) -> Description:
     """*tool* fixed to link *at* of *base*; *pose* is T_at_tool (identity if None), *prefix* goes before its names.
 
-    Names must not collide: pass a *prefix* if they do. The tool frame of the result is the tool's, if it has one.
+    Names must not collide: pass a *prefix* if they do. The tool frame of the result is the tool's, if it has one. What
+    divides into fingers after at most two moving joints is a hand: the result's hand begins at its root.
     """
     if at not in base.links:
         unknown_name("link", at, base.links, f"robot {base.name!r}")
@@ -81,8 +84,14 @@ def attach(
         tendons=base.tendons + hand.tendons,
         actuators=base.actuators + hand.actuators,
         loops=base.loops + hand.loops,
+        hand=hand.hand or (hand.root if base.free_joints and _is_hand(tool) else base.hand),
         tool=hand.tool or base.tool,
     )
+
+
+def _is_hand(description: Description) -> bool:
+    _, branches, passed = divide(description)
+    return len(branches) > 1 and passed <= 2
 
 
 def subtree(description: Description, root_link: str) -> Description:
@@ -135,6 +144,7 @@ def _restricted(description: Description, root: str, kept: set[str], joints: Ite
         tendons=tuple(t for t in description.tendons if t.arms.keys() <= inside),
         actuators=tuple(a for a in description.actuators if a.arms.keys() <= inside),
         loops=tuple(loop for loop in description.loops if {loop.first, loop.second} <= kept),
+        hand=description.hand if description.hand in kept else "",
         tool=description.tool if description.tool in kept else "",
     )
 

@@ -176,6 +176,7 @@ class Description:
     tendons: tuple[Tendon, ...] = ()
     actuators: tuple[Actuator, ...] = ()
     loops: tuple[Loop, ...] = ()  # closed chains that were cut on request; nothing here closes them
+    hand: str = ""  # link at which the hand begins; "" if there is none, or it is not known
     tool: str = ""  # frame that carries a tool, or at which grasps and targets are meant; "" if not known
 
     def joint(self, name: str) -> Joint:
