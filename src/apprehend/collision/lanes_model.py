@@ -18,8 +18,10 @@ FINEST = 0.045
 """A link is not split into spheres smaller than this share of the robot's reach."""
 
 
-def sphere_model(exact: CollideModel, nodes: Sequence[Node]) -> SphereModel:
+def sphere_model(exact: CollideModel, nodes: Sequence[Node], clearance: float) -> SphereModel:
     """The sphere model that goes with the exact one; of each of its blocks the first node moves.
+
+    Standing shapes that a link cannot come as near as *clearance* to are left out.
 
     It decides where links are spheres and what stands around boxes, cylinders, spheres and capsules.
     """
@@ -53,7 +55,8 @@ def sphere_model(exact: CollideModel, nodes: Sequence[Node]) -> SphereModel:
         if nodes[b].carrier >= 0:
             selves.append([number[a], number[b], *row[4:]])
         else:
-            meets += [(number[a], o) for o in fixed_of[b]]
+            centre, radius = reachable(exact, int(nodes[a].carrier), table[number[a]])
+            meets += [(number[a], o) for o in fixed_of[b] if gap(fixed[o], centre) <= radius + clearance]
     return SphereModel(
         links=exact.links,
         joints=exact.joints,
@@ -77,6 +80,21 @@ def _row(node: Array, balls: Array) -> Array:
     row[:3] = centre
     row[3] = float((np.linalg.norm(balls[:, :3] - centre, axis=1) + balls[:, 3]).max()) * (1.0 + 1e-12)
     return row
+
+
+def reachable(exact: CollideModel, carrier: int, row: Array) -> tuple[Array, float]:
+    """A ball that a node never leaves: around the first joint that moves it, as far as the links reach."""
+    radius = float(np.linalg.norm(row[:3])) + row[3]
+    while exact.links[carrier, 1] == 0 and exact.links[carrier, 0] >= 0:
+        radius += float(np.linalg.norm(exact.joints[carrier, 9:12]))
+        carrier = int(exact.links[carrier, 0])
+    return exact.joints[carrier, 9:12], radius * (1.0 + 1e-12) if exact.links[carrier, 1] == 0 else np.inf
+
+
+def gap(row: list[float], point: Array) -> float:
+    """Distance of a point to the box around a standing shape."""
+    local = (point - np.array(row[9:12])) @ np.array(row[:9]).reshape(3, 3)
+    return float(np.linalg.norm(np.maximum(np.abs(local) - row[12:15], 0.0))) - row[15]
 
 
 def fixed_row(shape: Convex) -> tuple[list[float], bool]:

@@ -190,7 +190,7 @@ class CollisionModel:
         if not (math.isfinite(clearance) and clearance >= 0.0):
             raise InputError(f"clearance is {clearance}; expected 0 or more, in m")
         other = self._with(self.nodes, self.reasons)
-        other.clearance, other._compiled, other._lanes = float(clearance), self._compiled, self._lanes
+        other.clearance, other._compiled = float(clearance), self._compiled
         other.resolution = self.resolution if resolution is None else float(resolution)
         return other
 
@@ -290,7 +290,7 @@ class CollisionModel:
     def lanes(self) -> SphereModel:
         """Arrays for the sphere kernels (layout: `apprehend.kernels.sphere`)."""
         if self._lanes is None:
-            self._lanes = sphere_model(self.compiled, self.nodes)
+            self._lanes = sphere_model(self.compiled, self.nodes, self.clearance)
         return self._lanes
 
     # --- questions -----------------------------------------------------------------------------------------------

@@ -13,6 +13,10 @@ import numpy as np
 from ._jit import kernel
 from .collide_edges import edge_blocked, edge_space
 
+SHRINK = 0.97  # of a domain, with every motion that is blocked
+
+PATIENCE = 25  # shortcuts in a row that bring nothing, before it is enough
+
 CONNECTED = 1
 FULL = 2
 MORE = 0
@@ -59,28 +63,38 @@ def extend(exact, lanes, nodes, parent, count, q, stride, greedy, margin, resolu
 
 
 @kernel
-def grow(exact, lanes, nodes, parent, count, samples, turn, stride, margin, resolution):
-    """Grow both trees with the configurations of ``samples (S, n)``; *turn* says which tree is first.
+def grow(exact, lanes, nodes, parent, domain, count, samples, stride, widest, least, margin, resolution):
+    """Grow both trees with the configurations of ``samples (S, n)``; the smaller tree goes first.
 
+    ``domain (2, C)``: how far from a node samples are of use to it. It is infinite until a motion from the node is
+    blocked, and then shrinks from *widest* to *least* with every such motion, so that nodes at a wall do not try to
+    pass it again and again (dynamic domain; Yershova, Jaillet, Siméon & LaValle 2005).
     Returns ``(status, samples used)``; when connected, the last node of each tree is the same configuration.
     """
     space = edge_space(exact, lanes, samples.shape[1])
     for s in range(samples.shape[0]):
-        one = (turn + s) % 2
-        for step in range(2):
-            # first one tree a step towards the sample, then the other as far as it gets towards the new node
-            tree = one if step == 0 else 1 - one
-            target = samples[s] if step == 0 else nodes[one, count[one] - 1]
-            before = count[tree]
-            count[tree], reached = extend(
-                exact, lanes, nodes[tree], parent[tree], before, target, stride, step == 1, margin, resolution, space
-            )
-            if step == 1 and reached:
-                return CONNECTED, s + 1
-            if count[tree] >= nodes.shape[1]:
-                return FULL, s + 1
-            if count[tree] == before:
-                break
+        one = 0 if count[0] <= count[1] else 1
+        row, far = nearest_node(nodes[one], count[one], samples[s])
+        if far > domain[one, row]:
+            continue
+        before = count[one]
+        count[one], _ = extend(
+            exact, lanes, nodes[one], parent[one], before, samples[s], stride, False, margin, resolution, space
+        )
+        if count[one] == before:
+            domain[one, row] = max(least, min(widest, SHRINK * domain[one, row]))
+            continue
+        if count[one] >= nodes.shape[1]:
+            return FULL, s + 1
+        other = 1 - one
+        count[other], reached = extend(
+            exact, lanes, nodes[other], parent[other], count[other], nodes[one, before], stride, True, margin,
+            resolution, space,
+        )  # fmt: skip
+        if reached:
+            return CONNECTED, s + 1
+        if count[other] >= nodes.shape[1]:
+            return FULL, s + 1
     return MORE, samples.shape[0]
 
 
@@ -144,8 +158,10 @@ def shortcut(exact, lanes, path, count, samples, margin, resolution):
     count = skip_vertices(exact, lanes, path, count, margin, resolution, space)
     a, b = np.empty(n), np.empty(n)
     rest = np.empty_like(path)
+    vain = 0
     for s in range(samples.shape[0]):
-        if count < 3 or count + 2 > path.shape[0]:
+        vain += 1
+        if count < 3 or count + 2 > path.shape[0] or vain > PATIENCE:
             break
         total = length(path, 0, count - 1)
         low = min(samples[s, 0], samples[s, 1]) * total
@@ -161,6 +177,7 @@ def shortcut(exact, lanes, path, count, samples, margin, resolution):
             continue
         if edge_blocked(exact, lanes, a, b, margin, resolution, space):
             continue
+        vain = 0
         # vertices 0 … i, a, b, k + 1 … end
         tail = count - (k + 1)
         for r in range(tail):

@@ -17,9 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .chain import at
-from .lanes import LANES
-from .tree import carry_block, shift_block, turn_block
+from .lanes import LANES, sincos
 
 PIECES = 2048
 """Largest number of pieces of a motion that wait to be checked."""
@@ -76,15 +74,63 @@ def sphere_space(model, n):
     )
 
 
+@kernel(inline=True)
+def at(index, width):
+    """First place of lane row ``width * index``; the sign is lost, so that the compiler sees it is not negative."""
+    return (index & 0xFFFFFFF) * width * LANES
+
+
 @kernel
 def move_lanes(links, joints, q, poses):
-    """Moved frames of all joints on lanes."""
+    """Moved frames of all joints on lanes: ``poses`` has 12 components for each."""
+    L = LANES
     for i in range(links.shape[0]):
-        carry_block(joints, i, poses, links[i, 0], i)
-        if links[i, 1] == 0:
-            turn_block(q, links[i, 2], joints[i, 12], joints[i, 13], poses, i)
+        t = at(i, 12)
+        if links[i, 0] < 0:
+            for k in range(12):
+                value = joints[i, k]
+                for lane in range(L):
+                    poses[t + k * L + lane] = value
         else:
-            shift_block(q, links[i, 2], joints[i, 12], joints[i, 13], poses, i)
+            s = at(links[i, 0], 12)
+            for k in range(3):
+                for j in range(3):
+                    x, y, z = joints[i, j], joints[i, 3 + j], joints[i, 6 + j]
+                    for lane in range(L):
+                        poses[t + (3 * k + j) * L + lane] = (
+                            poses[s + 3 * k * L + lane] * x
+                            + poses[s + (3 * k + 1) * L + lane] * y
+                            + poses[s + (3 * k + 2) * L + lane] * z
+                        )
+                x, y, z = joints[i, 9], joints[i, 10], joints[i, 11]
+                for lane in range(L):
+                    poses[t + (9 + k) * L + lane] = (
+                        poses[s + (9 + k) * L + lane]
+                        + poses[s + 3 * k * L + lane] * x
+                        + poses[s + (3 * k + 1) * L + lane] * y
+                        + poses[s + (3 * k + 2) * L + lane] * z
+                    )
+        turn_or_slide(links[i, 1], joints[i, 12], joints[i, 13], q, links[i, 2], poses, i)
+
+
+@kernel
+def turn_or_slide(kind, multiplier, offset, q, coordinate, poses, i):
+    """Move frame *i* by its joint: about its z (kind 0) or along it."""
+    L = LANES
+    t, d = at(i, 12), at(coordinate, 1)
+    if kind == 0:
+        for lane in range(L):
+            s, c = sincos(multiplier * q[d + lane] + offset)
+            for k in range(3):
+                b0 = poses[t + 3 * k * L + lane]
+                b1 = poses[t + (3 * k + 1) * L + lane]
+                poses[t + 3 * k * L + lane] = b0 * c + b1 * s
+                poses[t + (3 * k + 1) * L + lane] = b1 * c - b0 * s
+    else:
+        for lane in range(L):
+            h = multiplier * q[d + lane] + offset
+            for k in range(3):
+                poses[t + (9 + k) * L + lane] += h * poses[t + (3 * k + 2) * L + lane]
 
 
 @kernel

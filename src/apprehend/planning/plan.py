@@ -16,11 +16,17 @@ from ..kernels import collide_edges, collide_plan
 from ..kinematics import Robot
 from .result import PlanResult, PlanStatus
 
-STRIDE = 1.0
+STRIDE = 0.8
 """Largest step of a tree in joint space, in rad (and m)."""
+
+WIDEST, LEAST = 0.45, 0.2
+"""Bounds of a node's domain (see `kernels.collide_plan.grow`) relative to the diagonal of the joint space."""
 
 MAX_NODES = 20_000
 """Largest number of nodes of one tree."""
+
+FIRST_ROOM = 512
+"""Nodes that a tree has room for at first."""
 
 SHORTCUTS = 100
 """Random shortcuts that are tried on a path."""
@@ -66,33 +72,36 @@ def plan(
     def answer(status: PlanStatus, **facts: object) -> PlanResult:
         return PlanResult(status, seconds=time.perf_counter() - began, **facts)  # type: ignore[arg-type]
 
-    lower = np.where(moving, robot.limits.lower, q0)
-    upper = np.where(moving, robot.limits.upper, q0)
-    outside = violated(robot, q0, lower, upper)
-    if outside:
-        return answer(PlanStatus.START_OUT_OF_LIMITS, detail=f"{outside}.")
-    q0 = np.clip(q0, lower, upper)
+    limits = robot.limits
+    lower = np.where(moving, limits.lower, q0)
+    upper = np.where(moving, limits.upper, q0)
     if not len(targets):
         return answer(PlanStatus.NO_GOAL)
-    if not model.free(q0):
-        touches = model.why(q0)
-        return answer(PlanStatus.START_IN_COLLISION, detail=f"{'; '.join(map(str, touches[:3]))}.", touches=touches)
-
-    turning = moving & np.isneginf(lower) & np.isposinf(upper)
-    targets[:, turning] = q0[turning] + np.remainder(targets[:, turning] - q0[turning] + np.pi, 2.0 * np.pi) - np.pi
-    within = np.array([not violated(robot, target, lower, upper) for target in targets])
-    if not within.any():
+    turning = np.flatnonzero(moving & (limits.lower == -np.inf) & (limits.upper == np.inf))
+    if len(turning):
+        way = targets[:, turning] - q0[turning]
+        targets[:, turning] = q0[turning] + np.remainder(way + np.pi, 2.0 * np.pi) - np.pi
+    both = np.concatenate([q0[None], targets])
+    inside = np.clip(both, lower, upper)
+    within = np.abs(both - inside).max(axis=1) <= LIMIT_SLACK
+    if not within[0]:
+        return answer(PlanStatus.START_OUT_OF_LIMITS, detail=f"{violated(robot, q0, lower, upper)}.")
+    if not within[1:].any():
         worst = violated(robot, targets[0], lower, upper)
         return answer(PlanStatus.GOALS_OUT_OF_LIMITS, detail=f"Goal 0: {worst}.")
-    targets = np.clip(targets, lower, upper)
-    usable = np.flatnonzero(within & model.free(targets))
+    free = within & model.free(inside)
+    q0, targets = inside[0].copy(), inside[1:].copy()
+    if not free[0]:
+        touches = model.why(q0)
+        return answer(PlanStatus.START_IN_COLLISION, detail=f"{'; '.join(map(str, touches[:3]))}.", touches=touches)
+    usable = np.flatnonzero(free[1:])
     if not len(usable):
-        return answer(PlanStatus.GOALS_IN_COLLISION, **_why_goals(model, targets, within))
+        return answer(PlanStatus.GOALS_IN_COLLISION, **_why_goals(model, targets, within[1:]))
 
-    near = np.argsort(np.linalg.norm(targets[usable] - q0, axis=1), kind="stable")
+    near = np.argsort(((targets[usable] - q0) ** 2).sum(axis=1), kind="stable")
     direct = first_direct(model, q0, targets, usable[near])
     if direct >= 0:
-        path = np.array([q0, targets[direct]]) if (targets[direct] != q0).any() else q0[None].copy()
+        path = np.stack([q0, targets[direct]]) if (targets[direct] != q0).any() else q0[None].copy()
         return answer(PlanStatus.SUCCESS, path=path, goal=direct)
 
     # joints without limits: half a turn around the start and the goals
@@ -134,26 +143,40 @@ class Search:
 
     def __init__(self, model: CollisionModel, start: Array, goals: Array, max_nodes: int):
         self.model = model
-        room = max(max_nodes, len(goals) + 1)
-        self.nodes = np.zeros((2, room, len(start)))
+        self.most = max(max_nodes, len(goals) + 1)
+        room = min(self.most, max(FIRST_ROOM, 2 * len(goals)))
+        self.nodes = np.empty((2, room, len(start)))
         self.parent = np.full((2, room), -1, np.int64)
+        self.domain = np.full((2, room), np.inf)
         self.count = np.array([1, len(goals)], np.int64)
         self.nodes[0, 0] = start
         self.nodes[1, : len(goals)] = goals
         self.samples = 0
-        self.chunk = 16
+        self.chunk = 64
 
     def grow(self, rng: np.random.Generator, lower: Array, upper: Array) -> int:
         """Try one more portion of random configurations."""
         samples = rng.uniform(lower, upper, (self.chunk, len(lower)))
+        across = float(np.linalg.norm(upper - lower))
         status, used = collide_plan.grow(
             self.model.compiled, self.model.lanes,
-            self.nodes, self.parent, self.count,
-            samples, self.samples % 2, STRIDE, self.model.clearance, self.model.resolution,
+            self.nodes, self.parent, self.domain, self.count,
+            samples, STRIDE, WIDEST * across, LEAST * across, self.model.clearance, self.model.resolution,
         )  # fmt: skip
         self.samples += int(used)
-        self.chunk = min(2 * self.chunk, 256)
+        self.chunk = min(2 * self.chunk, 512)
+        if status == collide_plan.FULL and self.nodes.shape[1] < self.most:
+            self._make_room()
+            return int(collide_plan.MORE)
         return int(status)
+
+    def _make_room(self) -> None:
+        old = self.nodes.shape[1]
+        room = min(4 * old, self.most)
+        nodes, parent = np.empty((2, room, self.nodes.shape[2])), np.full((2, room), -1, np.int64)
+        domain = np.full((2, room), np.inf)
+        nodes[:, :old], parent[:, :old], domain[:, :old] = self.nodes, self.parent, self.domain
+        self.nodes, self.parent, self.domain = nodes, parent, domain
 
     def path(self) -> tuple[Array, int]:
         """The path through both trees once they meet, and the number of the goal that it reaches."""
