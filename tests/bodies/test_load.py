@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
 
 from apprehend import Body
 from apprehend.bodies import load, shapes
 from apprehend.errors import InputError, MeshError
 
 MUG = shapes.cylinder(0.045, 0.09)
+SOUND = [
+    data.encode()
+    if isinstance(data := trimesh.Trimesh(*shapes.box([0.1, 0.1, 0.1])).export(file_type=kind[1:]), str)
+    else data
+    for kind in load.FORMATS
+]
 
 
 @pytest.mark.parametrize("ending", load.FORMATS)
@@ -113,6 +124,37 @@ def test_garbage(tmp_path: Path, ending: str, data: bytes) -> None:
     path = tmp_path / f"bad{ending}"
     path.write_bytes(data)
     with pytest.raises(MeshError, match=r"bad\.\w+ (is not a readable|holds no triangles|: )"):
+        Body.load(path)
+
+
+@given(st.integers(0, 3), st.integers(0, 10_000))
+def test_damaged_files_never_end_in_a_traceback(which: int, seed: int) -> None:
+    """Bytes are overwritten, cut off or inserted: the answer is a body or a `MeshError`."""
+    rng = np.random.default_rng(seed)
+    data = bytearray(SOUND[which])
+    for _ in range(rng.integers(1, 6)):
+        at = int(rng.integers(len(data)))
+        change = rng.integers(3)
+        if change == 0:
+            data[at] = int(rng.integers(256))
+        elif change == 1:
+            del data[at : at + int(rng.integers(1, 40))]
+        else:
+            data[at:at] = rng.bytes(8)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"x{load.FORMATS[which]}"
+        path.write_bytes(bytes(data))
+        with contextlib.suppress(MeshError):
+            load.read_mesh(path)
+
+
+def test_a_glb_that_claims_a_billion_points(tmp_path: Path) -> None:
+    header = b'{"asset":{"version":"2.0"},"accessors":[{"componentType":5126,"count":9000000000,"type":"VEC3"}]}'
+    header += b" " * (-len(header) % 4)
+    chunk = len(header).to_bytes(4, "little") + b"JSON" + header
+    path = tmp_path / "bomb.glb"
+    path.write_bytes(b"glTF" + (2).to_bytes(4, "little") + (12 + len(chunk)).to_bytes(4, "little") + chunk)
+    with pytest.raises(MeshError, match=r"claims 9000000000 elements in .* bytes: the file is damaged or hostile"):
         Body.load(path)
 
 

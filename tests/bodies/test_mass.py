@@ -104,6 +104,15 @@ def test_masses_that_no_body_has(mass: float) -> None:
         Body.box([0.1, 0.1, 0.1], density=mass)
 
 
+def test_words_are_no_numbers() -> None:
+    with pytest.raises(InputError, match="mass is 'heavy' kg"):
+        Body.box([0.1, 0.1, 0.1], mass="heavy")
+    with pytest.raises(InputError, match="friction is 'rough'"):
+        Body.box([0.1, 0.1, 0.1], friction="rough")
+    with pytest.raises(InputError, match="friction is -1"):
+        Body.box([0.1, 0.1, 0.1]).with_(friction=-1)
+
+
 def test_mass_and_density_together() -> None:
     with pytest.raises(InputError, match=r"mass 1\.0 and density 2\.0 are both given"):
         Body.box([0.1, 0.1, 0.1], mass=1.0, density=2.0)

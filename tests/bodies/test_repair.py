@@ -153,6 +153,19 @@ def test_separate_parts_are_kept() -> None:
     assert body.repairs == ()
 
 
+def test_many_parts() -> None:
+    """Three hundred dice, some facing inwards, some sharing a place: quick, and each counted once."""
+    rng = np.random.default_rng(0)
+    places = np.array([[i, j, k] for i in range(10) for j in range(10) for k in range(3)]) * 0.02
+    die = shapes.box([0.01, 0.01, 0.01])
+    inward = rng.random(300) < 0.2
+    vertices = np.vstack([die[0] + p for p in places])
+    faces = np.vstack([(die[1][:, ::-1] if flip else die[1]) + 8 * i for i, flip in enumerate(inward)])
+    body = Body.from_mesh(vertices, faces)
+    assert body.volume == pytest.approx(300e-6)
+    assert body.repairs == (f"turned {inward.sum()} parts that faced inwards",)
+
+
 def test_a_cavity_stays_hollow() -> None:
     inner = shapes.box([0.05, 0.03, 0.02])
     body = Body.from_mesh(*two(BOX, (inner[0], inner[1][:, ::-1]), (0, 0, 0)))

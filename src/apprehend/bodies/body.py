@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, IntArray, as_array, as_shaped
+from ..arrays import Array, IntArray, as_shaped
 from ..errors import InputError, MeshError
 from ..files import replace_file
 from . import rest
@@ -121,9 +121,9 @@ class Body:
             raise MeshError(f"{where}: faces are of type {triangles.dtype}; expected integers (indices of vertices)")
         triangles = triangles.astype(np.int64)
         check_mesh(points, triangles, where)
-        for label, value, least in (("friction", friction, 0.0), ("torsional_friction", torsional_friction, 0.0)):
-            if not (math.isfinite(value) and value >= least):
-                raise InputError(f"{where}: {label} is {value}; expected a finite number, zero or more")
+        for label, value in (("friction", friction), ("torsional_friction", torsional_friction)):
+            if not (_is_number(value) and value >= 0.0):
+                raise InputError(f"{where}: {label} is {value!r}; expected a finite number, zero or more")
         kilograms, per_volume, mass_source = _mass_arguments(mass, density, where)
         mesh = mend(points, triangles)
         region, mesh = _enclosed(mesh, where)
@@ -278,12 +278,13 @@ class Body:
         from dataclasses import replace
 
         allowed = ("friction", "torsional_friction", "name", "mass")
-        for key in changes:
+        for key, value in changes.items():
             if key not in allowed:
                 raise InputError(f"a body has no changeable {key!r}; expected one of {', '.join(allowed)}")
+            if "friction" in key and not (_is_number(value) and value >= 0.0):  # type: ignore[operator]
+                raise InputError(f"{self.name}: {key} is {value!r}; expected a finite number, zero or more")
         if "mass" in changes:
-            value = as_array(changes["mass"], "mass")  # type: ignore[arg-type]
-            kilograms, _, mass_source = _mass_arguments(float(value), None, self.name)
+            kilograms, _, mass_source = _mass_arguments(changes["mass"], None, self.name)  # type: ignore[arg-type]
             changes.update(mass=kilograms, inertia=self.inertia * (kilograms / self.mass), mass_source=mass_source)
         return replace(self, **changes)  # type: ignore[arg-type]
 
@@ -304,10 +305,14 @@ class Body:
         return path
 
 
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and math.isfinite(value)
+
+
 def _positive(**values: float) -> None:
     for name, value in values.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(f"{name} is {value}; expected a positive length in m")
+        if not (_is_number(value) and value > 0.0):
+            raise InputError(f"{name} is {value!r}; expected a positive length in m")
 
 
 def _mass_arguments(mass: float | None, density: float | None, where: str) -> tuple[float, float | None, str]:
@@ -315,8 +320,8 @@ def _mass_arguments(mass: float | None, density: float | None, where: str) -> tu
     if mass is not None and density is not None:
         raise InputError(f"{where}: mass {mass} and density {density} are both given; give one")
     for label, value, unit in (("mass", mass, "kg"), ("density", density, "kg/m³")):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise InputError(f"{where}: {label} is {value} {unit}; expected a positive, finite number")
+        if value is not None and not (_is_number(value) and value > 0.0):
+            raise InputError(f"{where}: {label} is {value!r} {unit}; expected a positive, finite number")
     if mass is not None:
         return float(mass), None, "given"
     return 0.0, float(density or ASSUMED_DENSITY), "density" if density is not None else "assumed"

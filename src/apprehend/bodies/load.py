@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import io
+import json
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +85,8 @@ def _parse(data: bytes, path: Path) -> tuple[Array, IntArray]:
     import trimesh
 
     kind = path.suffix.lower()[1:]
+    if kind == "glb":
+        _check_glb(data, path)
     options: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
     try:
         # from memory: no resolver, so that a file can not make us open another one
@@ -98,6 +101,19 @@ def _parse(data: bytes, path: Path) -> tuple[Array, IntArray]:
     vertices = np.vstack([np.asarray(p.vertices, dtype=np.float64) for p in parts])
     faces = np.vstack([np.asarray(p.faces, dtype=np.int64) + o for p, o in zip(parts, offsets)])
     return vertices, faces
+
+
+def _check_glb(data: bytes, path: Path) -> None:
+    """Refuse a GLB whose tables claim more elements than the file has bytes: a few bytes could fill the memory."""
+    try:
+        length = int.from_bytes(data[12:16], "little")
+        header = json.loads(data[20 : 20 + length])
+        counts = [accessor["count"] for accessor in header.get("accessors", ())]
+        largest = max(map(int, counts), default=0)
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise MeshError(f"{path} is not a readable GLB mesh ({type(error).__name__}: {error})") from error
+    if largest > len(data):
+        raise MeshError(f"{path} claims {largest} elements in {len(data)} bytes: the file is damaged or hostile")
 
 
 def check_mesh(vertices: Array, faces: IntArray, where: str) -> None:

@@ -146,37 +146,47 @@ def _flat_cap(rim: Array) -> IntArray | None:
     return cap if abs(area.sum() - 0.5 * length) < 1e-6 * length and area.min() > -1e-9 * length else None
 
 
-def _part_volumes(mesh: Mended) -> tuple[IntArray, Array]:
+def _parts(mesh: Mended) -> tuple[list[IntArray], Array]:
+    """The faces of every part, and its signed volume in m³."""
     label = topology.components(mesh.faces)
-    return label, np.array([solid(mesh.vertices, mesh.faces[label == k]).volume for k in range(label.max() + 1)])
+    order = np.argsort(label, kind="stable")
+    parts = np.split(mesh.faces[order], np.cumsum(np.bincount(label))[:-1])
+    corners = mesh.vertices[mesh.faces] - mesh.vertices.mean(axis=0)
+    volumes = np.bincount(label, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0)
+    return parts, np.asarray(volumes, dtype=np.float64)
 
 
 def _swept(mesh: Mended) -> Mended:
     """Drop parts of next to no volume."""
-    label, volumes = _part_volumes(mesh)
-    crumbs = np.flatnonzero(np.abs(volumes) < CRUMB * np.abs(volumes).max())
-    if not len(crumbs):
+    parts, volumes = _parts(mesh)
+    crumbs = np.abs(volumes) < CRUMB * np.abs(volumes).max()
+    if not crumbs.any():
         return mesh
-    kept = topology.compact(mesh.vertices, mesh.faces[~np.isin(label, crumbs)])
-    return mesh.then(*kept, f"dropped {plural(len(crumbs), 'crumb')} of next to no volume")
+    kept = np.concatenate([part for part, crumb in zip(parts, crumbs) if not crumb])
+    note = f"dropped {plural(int(crumbs.sum()), 'crumb')} of next to no volume"
+    return mesh.then(*topology.compact(mesh.vertices, kept), note)
 
 
 def _outward(mesh: Mended) -> Mended:
     """Turn parts that face inwards, unless they are cavities: inside another part, and meant to be hollow."""
-    label, volumes = _part_volumes(mesh)
-    inward = np.flatnonzero(volumes < 0.0)
-    outer = np.flatnonzero(volumes > 0.0)
-    turned = []
-    for k in inward:
-        point = mesh.vertices[mesh.faces[label == k][0, 0]]
-        if not any(_inside(mesh.vertices, mesh.faces[label == j], point) for j in outer):
-            turned.append(k)
+    parts, volumes = _parts(mesh)
+    low, high = _boxes(mesh.vertices, parts)
+    turned = 0
+    for k in np.flatnonzero(volumes < 0.0):
+        point = mesh.vertices[parts[k][0, 0]]
+        around = (volumes > 0.0) & (low <= point).all(axis=1) & (point <= high).all(axis=1)
+        if not any(_inside(mesh.vertices, parts[j], point) for j in np.flatnonzero(around)):
+            parts[k] = parts[k][:, ::-1]
+            turned += 1
     if not turned:
         return mesh
-    faces = mesh.faces.copy()
-    flip = np.isin(label, turned)
-    faces[flip] = faces[flip][:, ::-1]
-    return mesh.then(mesh.vertices, faces, f"turned {plural(len(turned), 'part')} that faced inwards")
+    return mesh.then(mesh.vertices, np.concatenate(parts), f"turned {plural(turned, 'part')} that faced inwards")
+
+
+def _boxes(vertices: Array, parts: list[IntArray]) -> tuple[Array, Array]:
+    """Lower and upper corners ``(k, 3)`` of the boxes around *parts*."""
+    points = [vertices[part.reshape(-1)] for part in parts]
+    return np.array([p.min(axis=0) for p in points]), np.array([p.max(axis=0) for p in points])
 
 
 def _inside(vertices: Array, faces: IntArray, point: Array) -> bool:
@@ -197,31 +207,28 @@ def solid_angles(corners: Array) -> Array:
 
 
 def _united(mesh: Mended) -> Mended:
-    """Parts that overlap become one surface; parts that do not are left as they are."""
-    label = topology.components(mesh.faces)
-    count = int(label.max()) + 1
-    if count < 2:
+    """Parts that touch or overlap become one surface; parts that do not are left as they are."""
+    parts, volumes = _parts(mesh)
+    if len(parts) < 2 or not _any_meet(*_boxes(mesh.vertices, parts)):
         return mesh
-    boxes = np.array(
-        [
-            (v.min(axis=0), v.max(axis=0))
-            for k in range(count)
-            for v in [mesh.vertices[mesh.faces[label == k]].reshape(-1, 3)]
-        ]
-    )
-    apart = (boxes[:, None, 0] > boxes[None, :, 1]).any(axis=-1)
-    if (apart | apart.T | np.eye(count, dtype=bool)).all():
+    solids = [topology.compact(mesh.vertices, part) for part in parts]
+    united = union([p for p, v in zip(solids, volumes) if v > 0.0], [p for p, v in zip(solids, volumes) if v < 0.0])
+    if united is None or area(*united) > (1.0 - OVERLAP) * area(mesh.vertices, mesh.faces):
         return mesh
-    parts = [topology.compact(mesh.vertices, mesh.faces[label == k]) for k in range(count)]
-    volumes = [solid(*part).volume for part in parts]
-    united = union([part for part, v in zip(parts, volumes) if v > 0.0], [p for p, v in zip(parts, volumes) if v < 0.0])
-    if united is None:
-        return mesh
-    before, after = sum(volumes), solid(*united).volume
-    if area(*united) > (1.0 - OVERLAP) * area(mesh.vertices, mesh.faces):
-        return mesh
-    note = f"united {count} parts that touch or overlap (volume {before * 1e6:.4g} to {after * 1e6:.4g} cm³)"
+    before, after = volumes.sum(), solid(*united).volume
+    note = f"united {len(parts)} parts that touch or overlap (volume {before * 1e6:.4g} to {after * 1e6:.4g} cm³)"
     return mesh.then(*united, note)
+
+
+def _any_meet(low: Array, high: Array) -> bool:
+    """Whether any two boxes meet: those that do along x, swept in order, are compared along y and z."""
+    order = np.argsort(low[:, 0], kind="stable")
+    low, high = low[order], high[order]
+    for i in range(len(low) - 1):
+        near = slice(i + 1, int(np.searchsorted(low[:, 0], high[i, 0], side="right")))
+        if ((low[near, 1:] <= high[i, 1:]) & (low[i, 1:] <= high[near, 1:])).all(axis=1).any():
+            return True
+    return False
 
 
 def area(vertices: Array, faces: IntArray) -> float:
