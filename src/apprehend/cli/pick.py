@@ -61,7 +61,7 @@ def command(
     if view:
         from .. import viewer
 
-        viewer.show(episode)
+        viewer.show(episode, announce=console.print)
     return 0 if episode.success else 1
 
 

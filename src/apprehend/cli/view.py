@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+
+from .console import console
 
 
 def command(
@@ -19,11 +21,12 @@ def command(
     from ..kinematics import Robot
 
     path = Path(what)
+    page: dict[str, Any] = {"port": port, "open_browser": browser, "announce": console.print}
     if path.is_dir() or path.suffix == ".json":
-        viewer.show(path, port=port, open_browser=browser)
+        viewer.show(path, **page)
     elif path.suffix.lower() in (".obj", ".stl", ".ply", ".glb"):
-        viewer.show_body(Body.load(path), port=port, open_browser=browser)
+        viewer.show_body(Body.load(path), **page)
     elif what in HOUSEHOLD:
-        viewer.show_body(Body.household(what), port=port, open_browser=browser)
+        viewer.show_body(Body.household(what), **page)
     else:
-        viewer.show_robot(Robot.load(what), port=port, open_browser=browser)
+        viewer.show_robot(Robot.load(what), **page)
