@@ -109,6 +109,7 @@ def test_significant_digits(value: float, text: str) -> None:
         ("tracking_error", 1e-4, "0.1 mrad"), ("pose", np.eye(4).tolist(), "at (0, 0, 0) m"),
         ("path", [[0.0] * 7] * 3, "3 × 7 numbers"), ("q", list(range(20)), "20 values"), ("upright", True, "yes"),
         ("rejected", {"too wide": 3}, "3 too wide"), ("robot", "ur5e", "ur5e"), ("coverage", 0.5, "0.5"),
+        ("carried", -2.5e-5, "−2.50·10⁻⁵"),
     ],
 )  # fmt: skip
 def test_quantities(name: str, value: object, text: str) -> None:

@@ -15,6 +15,7 @@ NEWTONS = {"force", "forces", "needed", "required_force"}
 SECONDS = {"duration", "time", "simulated"}
 KILOGRAMS = {"mass"}
 MILLIRADIANS = {"tracking_error", "final_error"}
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SHOWN = 8
 """Longest list of numbers that is written out."""
 
@@ -39,7 +40,7 @@ def quantity(name: str, value: Any) -> str:
         return ", ".join(f"{v} {k}" for k, v in value.items())
     factor, unit = _unit(name)
     if isinstance(value, (int, float)):
-        return f"{significant(value * factor)}{unit}"
+        return f"{significant(value * factor) if unit else scientific(value)}{unit}"
     if isinstance(value, list):
         if value and isinstance(value[0], list):
             rows, columns = len(value), len(value[0])
@@ -60,6 +61,14 @@ def significant(value: float) -> str:
         return "< 0.001"
     text = f"{value:.3g}" if abs(value) < 1e3 else f"{value:.0f}"
     return text.replace("-", "−")
+
+
+def scientific(value: float) -> str:
+    """As `significant`, but tiny values with their power of ten."""
+    if not 0.0 < abs(value) < 1e-3:
+        return significant(value)
+    mantissa, exponent = f"{value:.2e}".split("e")
+    return f"{mantissa}·10{str(int(exponent)).translate(SUPERSCRIPT)}".replace("-", "−")
 
 
 def _unit(name: str) -> tuple[float, str]:
