@@ -8,7 +8,7 @@ import pytest
 
 from apprehend.errors import DescriptionError, MeshError
 from apprehend.robots import load_description, markup, parse_urdf, read_mesh, read_srdf, read_urdf
-from tests.robots.build import link, robot, write
+from tests.robots.build import joint, link, robot, write
 
 BOMB = """<?xml version="1.0"?>
 <!DOCTYPE lolz [<!ENTITY a "lol"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;"><!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;">]>
@@ -125,3 +125,68 @@ def test_only_mesh_files_are_meshes(tree: Path) -> None:
     (tree / "pkg/meshes/secret.txt").write_text("x")
     with pytest.raises(MeshError, match=r"files of type '\.txt' are not read; expected one of \.dae"):
         read_urdf(write(tree / "pkg/urdf", mesh_robot("../meshes/secret.txt")))
+
+
+def test_a_package_of_another_name_is_guessed_and_reported(tree: Path) -> None:
+    d = read_urdf(write(tree / "pkg/urdf", mesh_robot("package://renamed/meshes/in.stl")))
+    assert d.links["a"].visuals[0].mesh == tree / "pkg/meshes/in.stl"
+    assert "no folder of the package 'renamed' was found; took " in str(d.repairs[0])
+
+
+def test_backslashes_are_read_and_reported(tree: Path) -> None:
+    d = read_urdf(write(tree / "pkg/urdf", mesh_robot(r"..\meshes\in.stl")))
+    assert d.links["a"].visuals[0].mesh == tree / "pkg/meshes/in.stl"
+    assert "backslashes" in str(d.repairs[0])
+
+
+def test_a_default_namespace_says_nothing() -> None:
+    d = parse_urdf('<robot xmlns="http://drake.mit.edu" name="r"><link name="a"/></robot>')
+    assert d.root == "a"
+
+
+def test_long_circles_and_chains_are_answered_at_once() -> None:
+    count = 5_000
+    links = [link(f"l{i}") for i in range(count)]
+    circle = robot(*links, *(joint(f"j{i}", f"l{i}", f"l{(i + 1) % count}") for i in range(count)))
+    with pytest.raises(DescriptionError, match=r"the links form a cycle: .*… \(5000 in all\) …") as caught:
+        parse_urdf(circle)
+    assert len(str(caught.value)) < 400
+    follow = '<limit lower="-1" upper="1"/><mimic joint="j{}"/>'
+    chain = [joint(f"j{i}", "root", f"l{i}", inner=follow.format(i + 1)) for i in range(count - 1)]
+    d = parse_urdf(robot(link("root"), *links, *chain, joint(f"j{count - 1}", "root", f"l{count - 1}")))
+    mimic = d.joint("j0").mimic
+    assert mimic is not None
+    assert mimic.joint == f"j{count - 1}"
+
+
+@pytest.mark.parametrize(
+    ("inner", "said"),
+    [
+        ('<worldbody><replicate count="1000"><replicate count="1000"><body/></replicate></replicate></worldbody>',
+         r"<replicate> makes 1e\+06 of one; a description may have 10000"),
+        ('<asset><hfield name="h" nrow="100000" ncol="100000" size="1 1 1 1"/></asset>', "<hfield> makes"),
+        ('<worldbody><composite type="cable" count="x 1 1"/></worldbody>', "count='x 1 1' is not numbers"),
+        ('<asset><model name="m" file="../../../../../../etc/passwd"/></asset>', "outside the allowed folders"),
+    ],
+)  # fmt: skip
+def test_small_files_do_not_make_huge_models(tmp_path: Path, inner: str, said: str) -> None:
+    with pytest.raises(DescriptionError, match=said):
+        load_description(write(tmp_path, f"<mujoco>{inner}</mujoco>", "m.xml"))
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("m.stl", b"\0" * 80 + (2**31).to_bytes(4, "little") + b"\0" * 50),
+        ("m.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n"),
+        ("m.ply", b"ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n1\n"),
+        ("m.glb", b"glTF" + (2).to_bytes(4, "little") + (2**31).to_bytes(4, "little") + b"\0" * 20),
+        ("m.gltf", b'{"asset":{"version":"2.0"},"buffers":[{"uri":"../../../etc/passwd","byteLength":10}]}'),
+        ("m.off", b"OFF\n4000000000 4000000000 0\n"),
+        ("m.obj", b"v 0 0 0\nf 1 2 3\n"),
+    ],
+)
+def test_meshes_that_promise_more_than_they_hold(tmp_path: Path, name: str, data: bytes) -> None:
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(MeshError, match=r"mesh .* (cannot be read as|has no faces)"):
+        read_mesh(tmp_path / name)

@@ -292,6 +292,7 @@ def test_menagerie(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MENAGERIE_ROOT")
     monkeypatch.setenv("MENAGERIE_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setenv("MENAGERIE_BASE_URL", "http://127.0.0.1:9")
+    monkeypatch.setattr("time.sleep", lambda _: None)  # between its attempts
     with pytest.raises(DescriptionError, match=r"could not be downloaded .* go online once, or set MENAGERIE_ROOT"):
         load_description("menagerie:franka_emika_panda")
 

@@ -11,6 +11,10 @@ from .paths import MeshPaths
 
 MAX_FILES = 200
 """Most files that one model may include."""
+MAX_COPIES = 10_000
+"""Most copies that nested replications may make."""
+MAX_PIXELS = 50_000_000
+"""Most entries of a height field or a texture."""
 
 
 def check_files(path: Path, paths: MeshPaths) -> Document:
@@ -43,8 +47,11 @@ def _collect(
     documents.append(document)
     if len(documents) > MAX_FILES:
         raise DescriptionError(f"{chain[0]}: includes more than {MAX_FILES} files")
-    for element in document.root.iter("include"):
-        name = document.attribute(element, "file", "include")
+    _bounded(document)
+    for element in document.root.iter("include", "model"):
+        name = element.get("file")
+        if name is None:
+            continue
         candidates = [folder / name, document.source.parent / name]
         _check(document, element, name, candidates, paths)
         found = next((c for c in candidates if c.is_file()), None)
@@ -53,6 +60,23 @@ def _collect(
         if found.resolve() in chain:
             document.fail(element, f"includes {name!r}, which includes this file again")
         _collect(Document(read_text(found), found), folder, (*chain, found.resolve()), paths, documents)
+
+
+def _bounded(document: Document) -> None:
+    """Refuse models that a few bytes make huge."""
+    for element in document.root.iter("replicate", "composite", "flexcomp", "hfield", "texture"):
+        size, at = 1.0, element
+        while at is not None:
+            for key in ("count", "nrow", "ncol", "width", "height"):
+                for word in (at.get(key) or "").split():
+                    try:
+                        size *= max(1.0, float(word))
+                    except ValueError:
+                        document.fail(at, f"<{local(at)}>: {key}={at.get(key)!r} is not numbers")
+            at = at.getparent()
+        limit = MAX_PIXELS if local(element) in ("hfield", "texture") else MAX_COPIES
+        if size > limit:
+            document.fail(element, f"<{local(element)}> makes {size:.3g} of one; a description may have {limit}")
 
 
 def _check(document: Document, element: Any, name: str, candidates: list[Path], paths: MeshPaths) -> None:

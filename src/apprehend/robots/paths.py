@@ -56,6 +56,8 @@ class MeshPaths:
     def __init__(self, source: Path, packages: Packages) -> None:
         self.folder = source.resolve().parent
         self.named: dict[str, Path] = {}
+        self.guessed: dict[str, Path] = {}
+        """Packages that were not found by name, and the folder that was taken for them."""
         self.folders: list[Path] = []
         if isinstance(packages, Mapping):
             self.named = {str(k): Path(v).resolve() for k, v in packages.items()}
@@ -73,6 +75,9 @@ class MeshPaths:
             package, _, inner = rest.lstrip("/").partition("/")
             roots = self._package_folders(package)
             candidates = [(root / inner, (root, *self.allowed)) for root in roots]
+            if not roots and (self.allowed[0] / inner).is_file():  # the package goes by another name here
+                self.guessed.setdefault(package, self.allowed[0])
+                candidates = [(self.allowed[0] / inner, tuple(self.allowed))]
         elif scheme in ("", "file"):
             inner, package = rest, ""
             allowed = (*self.allowed, *shared_folders())

@@ -48,7 +48,7 @@ def ordered(links: Mapping[str, Link], joints: Iterable[Joint], where: Where) ->
     cycle = _cycle(carried)
     if cycle:
         raise DescriptionError(f"{where(carried[cycle[0]].name)}: the links form a cycle: "
-                               f"{' → '.join(cycle)} → {cycle[0]}; one link must be the root")  # fmt: skip
+                               f"{_circle(cycle)}; one link must be the root")  # fmt: skip
     if not roots:
         raise DescriptionError(f"{where('')}: there is no link; a description needs at least one")
     shown = ", ".join(map(repr, roots[:6])) + (", …" if len(roots) > 6 else "")
@@ -60,15 +60,21 @@ def _cycle(carried: Mapping[str, Joint]) -> list[str]:
     """The links of one cycle in order, or an empty list."""
     done: set[str] = set()
     for start in carried:
-        path: list[str] = []
+        path: dict[str, int] = {}
         link = start
         while link in carried and link not in done and link not in path:
-            path.append(link)
+            path[link] = len(path)
             link = carried[link].parent
         if link in path:
-            return list(reversed(path[path.index(link) :]))
+            return list(reversed(list(path)[path[link] :]))
         done.update(path)
     return []
+
+
+def _circle(names: list[str]) -> str:
+    """The names in a circle, shortened where there are many."""
+    shown = names if len(names) <= 12 else [*names[:6], f"… ({len(names)} in all) …", *names[-3:]]
+    return " → ".join([*shown, names[0]])
 
 
 def resolved_mimics(joints: tuple[Joint, ...], where: Where, repairs: list[Repair]) -> tuple[Joint, ...]:
@@ -77,31 +83,30 @@ def resolved_mimics(joints: tuple[Joint, ...], where: Where, repairs: list[Repai
     A follower of a fixed joint is fixed at its offset. Raises `DescriptionError` for a dangling mimic or a circle.
     """
     by_name = {j.name: j for j in joints}
-    out: list[Joint] = []
+    resolved: dict[str, Mimic] = {}
     for joint in joints:
-        if joint.mimic is None:
-            out.append(joint)
-            continue
-        multiplier, offset = joint.mimic.multiplier, joint.mimic.offset
-        leader, seen = joint.mimic.joint, [joint.name]
-        while True:
+        chain: dict[str, Joint] = {}  # followers from here to the first that is resolved, or to the leader
+        follower = joint
+        while follower.mimic is not None and follower.name not in resolved:
+            chain[follower.name] = follower
+            leader = follower.mimic.joint
+            place = f"{where(follower.name)}: joint {follower.name!r}"
             if leader not in by_name:
-                raise DescriptionError(f"{where(joint.name)}: joint {joint.name!r} mimics {leader!r}, which does not "
-                                       f"exist.{suggestion(leader, by_name)}")  # fmt: skip
-            if leader in seen:
-                raise DescriptionError(f"{where(joint.name)}: joint {joint.name!r} mimics itself through "
-                                       f"{' → '.join([*seen, leader])}; one of them must be free")  # fmt: skip
-            further = by_name[leader].mimic
-            if further is None:
-                break
-            seen.append(leader)
-            offset += multiplier * further.offset
-            multiplier *= further.multiplier
-            leader = further.joint
-        if by_name[leader].type is JointType.FIXED:
-            raise DescriptionError(f"{where(joint.name)}: joint {joint.name!r} mimics {leader!r}, which is fixed; "
-                                   "a mimic needs a joint that moves")  # fmt: skip
-        out.append(replace(joint, mimic=Mimic(leader, multiplier, offset)))
+                raise DescriptionError(f"{place} mimics {leader!r}, which does not exist.{suggestion(leader, by_name)}")
+            if leader in chain:
+                circle = list(chain)[list(chain).index(leader) :]
+                raise DescriptionError(f"{place} mimics itself through {_circle(circle)}; one of them must be free")
+            if by_name[leader].type is JointType.FIXED:
+                raise DescriptionError(f"{place} mimics {leader!r}, which is fixed; a mimic needs a joint that moves")
+            follower = by_name[leader]
+        for name, member in reversed(chain.items()):
+            own = member.mimic
+            assert own is not None
+            further = resolved.get(own.joint, Mimic(own.joint))
+            resolved[name] = Mimic(
+                further.joint, own.multiplier * further.multiplier, own.offset + own.multiplier * further.offset
+            )
+    out = [replace(j, mimic=resolved[j.name]) if j.mimic is not None else j for j in joints]
     return _leader_limits(tuple(out), where, repairs)
 
 

@@ -251,15 +251,25 @@ class _Reader:
 
     def _mesh(self, element: Any, what: str) -> Path | None:
         name = self.doc.attribute(element, "filename", what)
+        if "\\" in name:
+            self._repair_once(element, "mesh names have backslashes", "read as slashes, in all of them")
+            name = name.replace("\\", "/")
+        if name.startswith("package:///"):
+            self._repair_once(element, "mesh names have three slashes after package:", "read as two, in all of them")
         try:
-            if name.startswith("package:///") and not any("three slashes" in r.problem for r in self.doc.repairs):
-                self.doc.repair(element, "mesh names have three slashes after package:", "read as two, in all of them")
-            return self.paths.resolve(name, f"{self.doc.source}:{element.sourceline}")
+            path = self.paths.resolve(name, f"{self.doc.source}:{element.sourceline}")
+            for package, folder in self.paths.guessed.items():
+                self._repair_once(element, f"no folder of the package {package!r} was found", f"took {folder} for it")
+            return path
         except MeshError:
             if self.meshes == "require":
                 raise
             self.doc.repair(element, f"{what}: mesh {name!r} was not found", "left the shape out, as asked")
             return None
+
+    def _repair_once(self, element: Any, problem: str, remedy: str) -> None:
+        if not any(r.problem == problem for r in self.doc.repairs):
+            self.doc.repair(element, problem, remedy)
 
     def _origin(self, element: Any, what: str) -> Array:
         origin = next(plain_children(element, "origin"), None)
