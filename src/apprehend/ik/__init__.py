@@ -1,7 +1,9 @@
 """Inverse kinematics: solved, or why not (G 1.8)."""
 
 from .branches import BranchResult, BranchStatus, branches, redundancy_intervals, redundant_joint
+from .inverse import inverse_jacobian, inverse_singular_values, null_space_projector, transpose_step
 from .result import IKResult, IKStatus
+from .several import solve_frames
 from .solve import solve
 from .step import Stepper, TrackResult, TrackStatus, step, track
 from .tasks import (
@@ -38,9 +40,14 @@ __all__ = [
     "TrackResult",
     "TrackStatus",
     "branches",
+    "inverse_jacobian",
+    "inverse_singular_values",
+    "null_space_projector",
     "redundancy_intervals",
     "redundant_joint",
     "solve",
+    "solve_frames",
     "step",
     "track",
+    "transpose_step",
 ]

@@ -124,7 +124,7 @@ def solve(
     return IKResult(
         q=q.reshape(*shape, n_solutions, robot.n) if n_solutions > 1 else q.reshape(*shape, robot.n),
         codes=codes.reshape(shape),
-        residual=_residual(robot, frame, q[:, 0], poses).reshape(*shape, 2),
+        residual=residual_of(robot, frame, q[:, 0], poses).reshape(*shape, 2),
         found=found.reshape(shape),
         starts=starts.reshape(shape),
         certified=certified.reshape(shape),
@@ -203,7 +203,7 @@ def _tolerance(tolerance: ArrayLike, reach: float) -> tuple[Array, bool, int]:
     return scaled, partial, int(free[0]) if free.size == 1 else -1
 
 
-def _residual(robot: Robot, frame: str, q: Array, T: Array) -> Array:
+def residual_of(robot: Robot, frame: str, q: Array, T: Array) -> Array:
     """Distance and angle ``(N, 2)`` between targets and the poses that the robot's forward kinematics gives."""
     count = q.shape[0]
     model = robot.chain_model(frame)

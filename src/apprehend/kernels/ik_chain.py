@@ -56,6 +56,7 @@ WORK = 64 * L
 
 DAMPING = 0.01  # λ = DAMPING ‖e‖²
 FLOOR = 1e-9
+LOOSE = 1e-3  # tolerances above this (over the reach, or rad) are freedom that steps may use
 STEP = 0.8  # largest change of a coordinate in one step
 PATIENCE = 24.0  # steps before a start is given up
 STALL = 0.8  # every fourth step the squared error must have fallen below this share
@@ -173,11 +174,11 @@ def pose_error(w, tolerance, rotation_tolerance):
 
 @kernel
 def box_error(w, tool, box, free_axis):
-    """Error in the axes of the target, zero where it is inside ``box (6)``; flags as in `pose_error`.
+    """Error in the axes of the target, zero where it is inside a loose ``box (6)``; flags as in `pose_error`.
 
     *free_axis* is the one rotation axis whose tolerance is infinite (the error is then the turn between the two
-    directions of that axis), or −1. Outside its tolerance an error is measured from half the tolerance, so that
-    the step leads inside.
+    directions of that axis), or −1. Outside a tolerance above `LOOSE` an error is measured from half of it, so that
+    the step leads inside; a tight one is no room to move in, and its row always stays.
     """
     oriented = math.isfinite(box[3]) or math.isfinite(box[4]) or math.isfinite(box[5])
     for l in range(L):
@@ -223,11 +224,10 @@ def box_error(w, tool, box, free_axis):
             for h in range(2):
                 b = box[3 * h + k]
                 e = (d0 * px + d1 * py + d2 * pz) if h == 0 else (d0 * x + d1 * y + d2 * z)
-                if abs(e) <= b:
-                    e = 0.0
-                else:
+                if abs(e) > b:
                     inside = False
-                    e -= math.copysign(0.5 * b, e)
+                if b > LOOSE:
+                    e = 0.0 if abs(e) <= b else e - math.copysign(0.5 * b, e)
                 w[ERR + (3 * h + k) * L + l] = e
                 total += e * e
         w[LAMBDA + l] = FLOOR + DAMPING * total

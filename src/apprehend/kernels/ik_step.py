@@ -38,12 +38,12 @@ def project_rows(J, first, last, N, n, width, A):
 
 @kernel
 def normal_equations(A, rest, first, last, n, width, damping, H, z):
-    """``H = AᵀA + damping``, ``z = Aᵀ rest``, then z becomes H⁻¹ z by an LDLᵀ factorisation, all on lanes."""
+    """``H = AᵀA + damping (L)``, ``z = Aᵀ rest``, then z becomes H⁻¹ z by a Cholesky factorisation, all on lanes."""
     for c in range(width):
         for b in range(c + 1):
             out = H[(c * n + b) * L : (c * n + b + 1) * L]
             for l in range(L):
-                out[l] = damping if c == b else 0.0
+                out[l] = damping[l] if c == b else 0.0
             for i in range(first, last):
                 x = A[(i * n + c) * L : (i * n + c + 1) * L]
                 y = A[(i * n + b) * L : (i * n + b + 1) * L]
@@ -142,8 +142,8 @@ def take_rows_out(A, first, last, N, n, width, u, beta, dot, irregular):
 @kernel
 def steps_block(J, e, levels, damping, low, high, n, dq, N, A, H, rest, z, u, irregular):
     """All levels on lanes, without bounds; ``irregular (L)`` becomes 1 where the result must not be used."""
-    beta = np.empty(L)
-    dot = np.empty(L)
+    beta, dot = np.empty(L), np.empty(L)
+    damped = np.full(L, damping)
     irregular[:] = 0.0
     N[: n * n * L] = 0.0
     for k in range(n):
@@ -167,7 +167,7 @@ def steps_block(J, e, levels, damping, low, high, n, dq, N, A, H, rest, z, u, ir
                 y = dq[k * L : (k + 1) * L]
                 for l in range(L):
                     r[l] -= x[l] * y[l]
-        normal_equations(A, rest, first, last, n, width, damping, H, z)
+        normal_equations(A, rest, first, last, n, width, damped, H, z)
         for k in range(n):
             y = dq[k * L : (k + 1) * L]
             for c in range(width):
