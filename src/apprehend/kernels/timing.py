@@ -22,17 +22,14 @@ from ._jit import kernel
 WIDE = 64
 """Lanes of a block. Loops of 16 short steps are unrolled before they can be vectorised; loops of 64 are not."""
 
+MASK = 0x7FFFFFFF
+"""Offsets into lane buffers are masked with it, so that the compiler knows that they are not negative."""
+
 OK = 0
 INFEASIBLE = 1
 START = 2
 END = 3
 STALLED = 4
-
-
-@kernel(inline=True)
-def at(component):
-    """Where a component begins in a flat lane buffer; masked so that the compiler knows it is not negative."""
-    return (component * WIDE) & 0x7FFFFFFF
 
 
 @kernel
@@ -74,11 +71,11 @@ def _solved(a, b, lo, hi, r, lane, size, out):
     out[end + WIDE] = min(out[end + WIDE], most)
 
 
-@kernel(inline=True)
+@kernel
 def _place(r, lo, hi, ia, ib, work, size, out):
     """File the row r of all lanes; its coefficients a and b are at *ia* and *ib* of *work*."""
     odd = 0.0
-    base = at(3 * r)
+    base = (3 * r) * WIDE & MASK
     for lane in range(WIDE):
         a = work[ia + lane]
         b = work[ib + lane]
@@ -109,8 +106,8 @@ def velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, wo
     square = 2 * WIDE
     v = 4 * WIDE
     top = (4 + degree) * WIDE
-    acc = at(4 + degree + 2 * m + 1)
-    end = at(3 * size)
+    acc = (4 + degree + 2 * m + 1) * WIDE & MASK
+    end = (3 * size) * WIDE & MASK
     for lane in range(WIDE):
         out[end + lane] = 0.0
         out[end + WIDE + lane] = np.inf
@@ -126,18 +123,18 @@ def velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, wo
                 work[b + lane] = 0.0
             for p in range(degree):
                 weight = (p + 1) / binomial[m, p]
-                to = v + at(p)
-                source = at((p + 1) * n + j)
+                to = v + (p * WIDE & MASK)
+                source = ((p + 1) * n + j) * WIDE & MASK
                 for lane in range(WIDE):
                     work[to + lane] = weight * local[source + lane] * shift[2 * WIDE + lane]
             for level in range(1, degree):
                 for p in range(m, level - 1, -1):
-                    to = v + at(p)
-                    before = v + at(p - 1)
+                    to = v + (p * WIDE & MASK)
+                    before = v + ((p - 1) * WIDE & MASK)
                     for lane in range(WIDE):
                         work[to + lane] += work[before + lane]
             for p in range(degree):
-                to = v + at(p)
+                to = v + (p * WIDE & MASK)
                 for lane in range(WIDE):
                     value = work[to + lane]
                     work[a + lane] = value if value > work[a + lane] else work[a + lane]
@@ -151,11 +148,11 @@ def velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, wo
                     work[square + lane] = 0.0
                 for p in range(max(0, k - m), min(m, k) + 1):
                     weight = binomial[m, p] * binomial[m, k - p] / binomial[2 * m, k]
-                    one = v + at(p)
-                    two = v + at(k - p)
+                    one = v + (p * WIDE & MASK)
+                    two = v + ((k - p) * WIDE & MASK)
                     for lane in range(WIDE):
                         work[square + lane] += weight * work[one + lane] * work[two + lane]
-                to = top + at(k)
+                to = top + (k * WIDE & MASK)
                 for lane in range(WIDE):
                     value = work[square + lane] * work[a + lane]
                     work[to + lane] = value if value > work[to + lane] else work[to + lane]
@@ -163,10 +160,10 @@ def velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, wo
         for p in range(degree):
             first = 0.5 * (p + 1.0) / binomial[m, p] + (p + 1.0) * p / binomial[m, p]
             second = (p + 2.0) * (p + 1.0) / binomial[m, p] if p + 2 <= degree else 0.0
-            source = at((p + 1) * n + j)
-            further = at((p + 2 if p + 2 <= degree else p + 1) * n + j)
-            to = v + at(p)
-            other = acc + at(p)
+            source = ((p + 1) * n + j) * WIDE & MASK
+            further = ((p + 2 if p + 2 <= degree else p + 1) * n + j) * WIDE & MASK
+            to = v + (p * WIDE & MASK)
+            other = acc + (p * WIDE & MASK)
             for lane in range(WIDE):
                 scale = shift[2 * WIDE + lane] * shift[2 * WIDE + lane]
                 half = first * local[source + lane]
@@ -174,16 +171,16 @@ def velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, wo
                 work[other + lane] = (second * local[further + lane] - half) * scale
         for level in range(1, degree):
             for p in range(m, level - 1, -1):
-                to = v + at(p)
-                before = v + at(p - 1)
+                to = v + (p * WIDE & MASK)
+                before = v + ((p - 1) * WIDE & MASK)
                 for lane in range(WIDE):
                     work[to + lane] += work[before + lane]
-                to = acc + at(p)
-                before = acc + at(p - 1)
+                to = acc + (p * WIDE & MASK)
+                before = acc + ((p - 1) * WIDE & MASK)
                 for lane in range(WIDE):
                     work[to + lane] += work[before + lane]
         for p in range(degree):
-            _place(r, alim[j, 0], alim[j, 1], acc + at(p), v + at(p), work, size, out)
+            _place(r, alim[j, 0], alim[j, 1], acc + (p * WIDE & MASK), v + (p * WIDE & MASK), work, size, out)
             r += 1
     # velocity² of the worst coordinate: Bernstein coefficients at `top` of degree 2 D − 2, times x (1 − σ) + y σ
     last = 2 * degree - 1
@@ -193,8 +190,8 @@ def velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, wo
     for k in range(1, last + 1):
         left = (last - k) / last
         right = k / last
-        here = top + at(k if k < last else 0)
-        before = top + at(k - 1)
+        here = top + ((k if k < last else 0) * WIDE & MASK)
+        before = top + ((k - 1) * WIDE & MASK)
         for lane in range(WIDE):
             work[a + lane] = left * work[here + lane]
             work[b + lane] = right * work[before + lane]
@@ -238,7 +235,7 @@ def load_block(coefficients, piece, shift, local):
         same = same and piece[lane] == piece[0]
     for p in range(degree + 1):
         for j in range(n):
-            to = at(p * n + j)
+            to = (p * n + j) * WIDE & MASK
             if same:
                 value = coefficients[piece[0], p, j]
                 for lane in range(WIDE):
@@ -249,13 +246,13 @@ def load_block(coefficients, piece, shift, local):
     for p in range(degree):
         for q in range(degree - 1, p - 1, -1):
             for j in range(n):
-                to = at(q * n + j)
-                above = at((q + 1) * n + j)
+                to = (q * n + j) * WIDE & MASK
+                above = ((q + 1) * n + j) * WIDE & MASK
                 for lane in range(WIDE):
                     local[to + lane] += shift[lane] * local[above + lane]
     for p in range(1, degree + 1):
         for j in range(n):
-            to = at(p * n + j)
+            to = (p * n + j) * WIDE & MASK
             for lane in range(WIDE):
                 h = shift[WIDE + lane]
                 scale = h
@@ -432,22 +429,26 @@ def relieve(grid, rows, size, pinned, x_start, x_end, simple, x):
     mirror(rows, size, count, backward)
     back = np.zeros(count + 1)
     trial = np.empty(count + 1)
-    status, _ = profile(
-        -grid[::-1].copy(), backward, size + 1, pinned[::-1].copy(), x_end, x_start, simple, np.empty(count + 1), trial,
-        back,
-    )  # fmt: skip
+    reverse = np.empty(count + 1)
+    marks = np.empty(count + 1, dtype=np.bool_)
+    for i in range(count + 1):
+        reverse[i] = -grid[count - i]
+        marks[i] = pinned[count - i]
+    scratch = np.empty(count + 1)
+    status, _ = profile(reverse, backward, size + 1, marks, x_end, x_start, simple, scratch, trial, back)
     if status != OK:
         return
-    best = x.copy()
     least = duration(grid, x)
+    chosen = 0.0
     for share in (0.25, 0.5, 0.75, 1.0):
         for i in range(count + 1):
             trial[i] = (1.0 - share) * x[i] + share * back[count - i]
         time = duration(grid, trial)
         if time < least:
             least = time
-            best[:] = trial
-    x[:] = best
+            chosen = share
+    for i in range(count + 1):
+        x[i] = (1.0 - chosen) * x[i] + chosen * back[count - i]
 
 
 @kernel
@@ -479,7 +480,10 @@ def split_evenly(breaks, count, least, parts):
         parts[k] = max(wanted, least)
         total += parts[k]
     while total > count:  # take back what the small pieces got too much, from the largest
-        k = int(np.argmax(parts))
+        k = 0
+        for i in range(pieces):
+            if parts[i] > parts[k]:
+                k = i
         if parts[k] <= least:
             break
         parts[k] -= 1
@@ -503,6 +507,7 @@ def subdivide(breaks, parts, out):
 def kinks(breaks, coefficients, grid, pinned):
     """Mark the grid points at breaks of the path where its tangent jumps."""
     degree = coefficients.shape[1] - 1
+    i = 0
     for k in range(coefficients.shape[0] - 1):
         h = breaks[k + 1] - breaks[k]
         jump = 0.0
@@ -515,7 +520,9 @@ def kinks(breaks, coefficients, grid, pinned):
             size = max(size, abs(left), abs(right))
             jump = max(jump, abs(left - right))
         if jump > 1e-9 * size:
-            pinned[np.searchsorted(grid, breaks[k + 1])] = True
+            while grid[i] < breaks[k + 1]:
+                i += 1
+            pinned[i] = True
 
 
 @kernel
@@ -526,7 +533,8 @@ def solve_into(
     count = grid.shape[0] - 1
     size = row_count(coefficients.shape[1] - 1, coefficients.shape[2], sampled.shape[2])
     rows_along(breaks, coefficients, grid, vlim, alim, sampled, bounds, binomial, rows)
-    pinned[:] = False
+    for i in range(count + 1):
+        pinned[i] = False
     kinks(breaks, coefficients, grid, pinned)
     simple = sampled.shape[2] == 0
     status, stage = profile(grid, rows, size, pinned, x_start, x_end, simple, alpha, beta, x)
@@ -536,21 +544,6 @@ def solve_into(
         for i in range(count):
             if x[i] <= 0.0 and x[i + 1] <= 0.0:
                 return STALLED, i
-    return status, stage
-
-
-@kernel
-def solve(breaks, coefficients, grid, vlim, alim, sampled, bounds, binomial, x_start, x_end, alpha, beta, x, t, timing):
-    """Everything for one path: profile and times. Returns (status, stage)."""
-    count = grid.shape[0] - 1
-    size = row_count(coefficients.shape[1] - 1, coefficients.shape[2], sampled.shape[2])
-    rows = np.empty(((count + WIDE - 1) // WIDE, (3 * size + 2) * WIDE))
-    pinned = np.empty(count + 1, dtype=np.bool_)
-    status, stage = solve_into(
-        breaks, coefficients, grid, vlim, alim, sampled, bounds, binomial, x_start, x_end, rows, pinned, alpha, beta, x
-    )
-    if status == OK:
-        times(grid, x, t, timing)
     return status, stage
 
 

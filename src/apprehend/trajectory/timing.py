@@ -147,15 +147,18 @@ class _Problem:
 
     def solve(self, sampled: Sampled | None) -> Timing:
         count = self.grid.size - 1
-        x, alpha, beta, t = np.zeros((4, count + 1))
-        timing = np.zeros((count, 3))
+        x, alpha, beta = np.zeros((3, count + 1))
         values, bounds = (NO_SAMPLES, NO_BOUNDS) if sampled is None else (sampled.values, sampled.bounds)
-        status, stage = kernels.solve(
+        rows = 3 * kernels.row_count(self.path.degree, self.path.n, values.shape[2]) + 2
+        scratch = np.empty((-(-count // kernels.WIDE), rows * kernels.WIDE))
+        status, stage = kernels.solve_into(
             self.path.breaks, self.path.coefficients, self.grid, self.vlim, self.alim, values, bounds,
-            binomials(2 * self.path.degree), self.start_speed**2, self.end_speed**2, alpha, beta, x, t, timing,
+            binomials(2 * self.path.degree), self.start_speed**2, self.end_speed**2, scratch,
+            np.empty(count + 1, dtype=np.bool_), alpha, beta, x,
         )  # fmt: skip
         if status == kernels.OK:
-            return Timing(TimingStatus.SUCCESS, self.path, self.limits, self.grid, np.sqrt(x), t, timing)
+            return profile_timing(self.path, self.limits, self.grid, x)
+        t, timing = np.zeros(count + 1), np.zeros((count, 3))
         return self._failure(status, stage, alpha, beta, np.sqrt(x), t, timing, sampled)
 
     def _failure(
