@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ..kinematics import Robot
 
 SAMPLES = 24  # random postures in which a pair of links must always touch to be taken as meant to
+ROTOR = 300.0  # rad/s², see `_rotor`
 MASSLESS = 1e-3  # kg, and the inertia of that at 1 cm, of a moving link that has no mass and carries none
 CARRIER = 1e-6  # kg of a moving link without mass that carries others, which have it
 MINIMUM = 1e-9  # what the engine takes as positive inertia
@@ -118,6 +119,8 @@ def _add_robot(spec: Any, robot: Robot, physics: Physics) -> list[str]:
         if joint.type is JointType.FIXED:
             continue
         _add_joint(body, joint, physics)
+        if not joint.armature and _rotor(joint):
+            assumptions.append(f"joint {joint.name} states no rotor inertia; {_rotor(joint):.2g} kg m² are assumed")
         if joint.child in massive:
             continue
         carries = joint.child in carriers
@@ -188,7 +191,7 @@ def _massive_groups(description: Description) -> tuple[set[str], set[str]]:
 def _add_joint(body: Any, joint: Joint, physics: Physics) -> None:
     kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.type is JointType.PRISMATIC else mujoco.mjtJoint.mjJNT_HINGE
     made = body.add_joint(name=f"joint:{joint.name}", type=kind, axis=joint.axis)
-    made.armature = joint.armature
+    made.armature = joint.armature or _rotor(joint)
     made.frictionloss = joint.friction
     made.damping[0] = joint.damping
     made.limited = mujoco.mjtLimited.mjLIMITED_FALSE
@@ -198,6 +201,16 @@ def _add_joint(body: Any, joint: Joint, physics: Physics) -> None:
         made.range = [lower, upper]
         made.solref_limit = [2.0 * physics.timestep, 1.0]
         made.solimp_limit = physics.joint_solimp
+
+
+def _rotor(joint: Joint) -> float:
+    """Reflected inertia in kg m² of the rotor behind a joint that states none, but has the dry friction of a gear.
+
+    The order of magnitude of geared arms: full effort would accelerate the rotor alone by `ROTOR` rad/s². Without it
+    the last joints of many descriptions have next to no inertia against their friction.
+    """
+    geared = joint.type is not JointType.PRISMATIC and joint.mimic is None and joint.friction > 0.0
+    return joint.limits.effort / ROTOR if geared and np.isfinite(joint.limits.effort) else 0.0
 
 
 def _allowed_pairs(description: Description) -> frozenset[frozenset[str]]:

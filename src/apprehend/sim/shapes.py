@@ -1,7 +1,7 @@
 """Shapes of links, bodies and boxes as geoms of the physics engine.
 
-Contacts see convex hulls and primitives; the simulated cameras see a link's collision meshes with their own faces,
-and a body's whole mesh.
+Contacts see primitives and the convex pieces of meshes, the same ones that the collision checks use, so that what is
+planned free is free; the simulated cameras see a link's collision meshes with their own faces, and a body's mesh.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ import mujoco
 import numpy as np
 
 from ..arrays import Array, IntArray
+from ..collision.shapes import mesh_hulls
 from ..robots import load_shape_mesh
 from ..robots.description import Shape, ShapeKind
+from .primitives import as_round
 
 if TYPE_CHECKING:
     from ..bodies import Body
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 STATIC, ROBOT, BODY = 1, 2, 4  # contact bits: what stands still, links, bodies
 FIXED_GROUP, SEEN_GROUP, ROBOT_GROUP, HIDDEN_GROUP = 0, 1, 2, 3  # geom groups; cameras see all but the last
 THICKNESS = 1e-4  # m given to a flat collision mesh, which has no hull with a volume
+MOST_CORNERS = 2000  # of an exact hull in contact
 LINK_COLOUR = (0.75, 0.76, 0.78, 1.0)
 
 
@@ -77,8 +80,15 @@ def add_shape(spec: Any, body: Any, shape: Shape, name: str) -> str | None:
             geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=half, **options)
             assumption = f"the collision mesh {name} is flat; a box {THICKNESS * 1e3:g} mm thick stands for it"
         else:
+            for i, piece in enumerate(mesh_hulls(vertices, faces)):
+                add_mesh(spec, f"{name}:{i}", piece.points)
+                hull = body.add_geom(
+                    type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"{name}:{i}", **{**options, "group": HIDDEN_GROUP}
+                )
+                place(hull, T @ piece.pose)
             add_mesh(spec, name, vertices, faces)
-            geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **options)
+            seen = {**options, "contype": 0, "conaffinity": 0}
+            geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **seen)
     elif shape.kind is ShapeKind.BOX:
         geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * np.asarray(size), **options)
     elif shape.kind is ShapeKind.SPHERE:
@@ -132,13 +142,45 @@ def add_body(spec: Any, name: str, body: Body, pose: Array, physics: Physics, *,
         "solimp": physics.solimp,
         "mass": 0.0,
     }
-    for i, (vertices, _) in enumerate(body.convex_pieces):
-        mesh = add_mesh(spec, f"body:{name}:{i}", vertices)
-        holder.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, **contact)
+    for i, (vertices, faces) in enumerate(_pieces(body)):
+        shape = as_round(vertices, _volume(vertices, faces))
+        if shape is None:
+            mesh = add_mesh(spec, f"body:{name}:{i}", vertices)
+            holder.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, **contact)
+            continue
+        kind = mujoco.mjtGeom.mjGEOM_CYLINDER if shape.height else mujoco.mjtGeom.mjGEOM_SPHERE
+        place(holder.add_geom(type=kind, size=[shape.radius, 0.5 * shape.height, 0.0], **contact), shape.pose)
     mesh = add_mesh(spec, f"body:{name}", body.vertices, body.faces)
     holder.add_geom(
         type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, contype=0, conaffinity=0, group=SEEN_GROUP, mass=0.0
     )
+
+
+def _pieces(body: Body) -> list[tuple[Array, IntArray]]:
+    """Convex pieces that touch: the body's, or the exact hull where one piece stands for the whole."""
+    pieces = list(body.convex_pieces)
+    if len(pieces) > 1:
+        return pieces
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(body.vertices)
+    if len(hull.vertices) > MOST_CORNERS:
+        return pieces
+    corners = body.vertices[hull.vertices]
+    number = np.full(len(body.vertices), -1, dtype=np.int64)
+    number[hull.vertices] = np.arange(len(hull.vertices))
+    faces = number[hull.simplices]
+    # Qhull does not orient its triangles; turn each so that its normal points out
+    a, b, c = (corners[faces[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0.0
+    faces[inward] = faces[inward][:, ::-1]
+    return [(corners, faces)]
+
+
+def _volume(vertices: Array, faces: IntArray) -> float:
+    """Volume that closed *faces* enclose, in m³."""
+    a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
+    return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6.0
 
 
 def full_inertia(inertia: Array) -> list[float]:
