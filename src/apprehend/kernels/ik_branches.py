@@ -60,6 +60,12 @@ def row(M, i):
 def turn(h, angle, v):
     """Rodrigues: *v* turned about the unit vector *h*."""
     s, c = sincos(angle)
+    return turn_by(h, s, c, v)
+
+
+@kernel
+def turn_by(h, s, c, v):
+    """As `turn`, by an angle whose sine and cosine are known."""
     k = cross(h, v)
     f = (1.0 - c) * dot(h, v)
     return c * v[0] + s * k[0] + f * h[0], c * v[1] + s * k[1] + f * h[1], c * v[2] + s * k[2] + f * h[2]
@@ -255,15 +261,20 @@ def wrist_branches(h, o, slack, R, p, out, three, F, roots):
     for i in range(arms):
         a1, a2, a3 = three[i, 0], three[i, 1], three[i, 2]
         h1, h2, h3 = row(h, 0), row(h, 1), row(h, 2)
-        wrist = turn(h3, -a3, turn(h2, -a2, turn(h1, -a1, Rh)))  # (R1 R2 R3)ᵀ R h6 = R4 R5 h6
-        cross_wrist = turn(h3, -a3, turn(h2, -a2, turn(h1, -a1, Rs)))
+        s1, c1 = sincos(a1)
+        s2, c2 = sincos(a2)
+        s3, c3 = sincos(a3)
+        # (R1 R2 R3)ᵀ R h6 = R4 R5 h6
+        wrist = turn_by(h3, -s3, c3, turn_by(h2, -s2, c2, turn_by(h1, -s1, c1, Rh)))
+        cross_wrist = turn_by(h3, -s3, c3, turn_by(h2, -s2, c2, turn_by(h1, -s1, c1, Rs)))
         many, x, y = angles_at_height(h5, h4, h6, dot(h4, wrist), slack)
         for j in range(many):
             a5 = x if j == 0 else y
-            a4 = angle_between(h4, turn(h5, a5, h6), wrist)
+            s5, c5 = sincos(a5)
+            a4 = angle_between(h4, turn_by(h5, s5, c5, h6), wrist)
             out[count, 0], out[count, 1], out[count, 2] = a1, a2, a3
             out[count, 3], out[count, 4] = a4, a5
-            out[count, 5] = angle_between(h6, side, turn(h5, -a5, turn(h4, -a4, cross_wrist)))
+            out[count, 5] = angle_between(h6, side, turn_by(h5, -s5, c5, turn(h4, -a4, cross_wrist)))
             count += 1
     return count
 
@@ -341,12 +352,15 @@ def parallel_branches(h, o, slack, R, p, out, three, F, roots):
     count = 0
     for i in range(firsts):
         a1, a5 = three[i, 0], three[i, 1]
+        s1, c1 = sincos(a1)
+        s5, c5 = sincos(a5)
         # h2ᵀ R1ᵀ R = h2ᵀ R5 R6
-        a6 = angle_between(h6, apply(Rt, turn(h1, a1, h2)), turn(h5, -a5, h2))
+        a6 = angle_between(h6, apply(Rt, turn_by(h1, s1, c1, h2)), turn_by(h5, -s5, c5, h2))
         # the three joints together turn h2's side by R1ᵀ R R6ᵀ R5ᵀ
-        total = angle_between(h2, side, turn(h1, -a1, apply(R, turn(h6, -a6, turn(h5, -a5, side)))))
-        rest = sub(turn(h1, -a1, b), p12)
-        rest = sub(rest, turn(h2, total, add(p45, turn(h5, a5, p56))))
+        turned = apply(R, turn(h6, -a6, turn_by(h5, -s5, c5, side)))
+        total = angle_between(h2, side, turn_by(h1, -s1, c1, turned))
+        rest = sub(turn_by(h1, -s1, c1, b), p12)
+        rest = sub(rest, turn(h2, total, add(p45, turn_by(h5, s5, c5, p56))))
         # rest = R2 (p23 + R3 p34), within the plane across h2
         along = dot(h2, rest)
         flat = dot(rest, rest) - along * along
