@@ -141,7 +141,7 @@ def _box_frame(points: Array) -> tuple[Array, Array]:
     """A tight oriented box: rotation (3, 3) and centre (3,); principal axes or the given ones, whichever is smaller."""
     best: tuple[float, Array, Array] | None = None
     spread = points - points.mean(axis=0)
-    for turn in (np.eye(3), np.linalg.svd(spread, full_matrices=True)[2].T):
+    for turn in (np.eye(3), np.linalg.eigh(spread.T @ spread)[1]):
         if np.linalg.det(turn) < 0.0:
             turn = turn * np.array([1.0, 1.0, -1.0])
         local = points @ turn

@@ -112,12 +112,23 @@ def _corners(points: Array) -> tuple[Array, list[tuple[int, int]]]:
     try:
         hull = ConvexHull(points)
     except QhullError:
-        return points, []
+        return _flat_corners(points), []
     number = np.full(len(points), -1)
     number[hull.vertices] = np.arange(len(hull.vertices))
     triangles = number[hull.simplices]
     sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     return points[hull.vertices], [(int(i), int(j)) for i, j in np.unique(sides, axis=0)]
+
+
+def _flat_corners(points: Array) -> Array:
+    """The corners of points in one plane, or the ends of points on one line."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    along = (points - points.mean(axis=0)) @ np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2].T
+    try:
+        return np.asarray(points[ConvexHull(along[:, :2]).vertices])
+    except QhullError:
+        return np.asarray(points[[int(along[:, 0].argmin()), int(along[:, 0].argmax())]])
 
 
 def enclosing_ball(points: Array) -> tuple[Array, float]:
