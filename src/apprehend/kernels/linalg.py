@@ -24,6 +24,7 @@ def factor_block(A, n, scratch):
 
     Sums gather in *scratch*: a loop that reads and writes one array at offsets known at run time does not vectorise.
     """
+    factor = np.empty(LANES)
     for i in range(n):
         ii = entry(i, i)
         for j in range(i):
@@ -41,15 +42,14 @@ def factor_block(A, n, scratch):
         for lane in range(LANES):
             scratch[lane] = A[ii + lane]
         for j in range(i):
-            _scale(A, entry(i, j), entry(j, j), scratch)
+            _scale(A, entry(i, j), entry(j, j), scratch, factor)
         for lane in range(LANES):
             A[ii + lane] = scratch[lane]
 
 
 @kernel
-def _scale(A, ij, jj, diagonal):
+def _scale(A, ij, jj, diagonal, factor):
     """Turn entry ij of L D into L and take its part off the diagonal of its row."""
-    factor = np.empty(LANES)
     for lane in range(LANES):
         factor[lane] = A[ij + lane] / A[jj + lane]
     for lane in range(LANES):

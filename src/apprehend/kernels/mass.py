@@ -112,7 +112,7 @@ def _axis_and_momentum(i, turning, origin, poses, composite, screw):
         screw[o + 11 * L + lane] = xz * wx + yz * wy + composite[t + 9 * L + lane] * wz + hx * vy - hy * vx
 
 
-@kernel
+@kernel(inline=True)
 def mass_block(model, q, origin, scratch, poses, composite, screw, M):
     """Mass matrix of one block: a packed triangle (see `linalg`).
 
@@ -210,11 +210,12 @@ def forward_dynamics(model, q, qd, tau, gravity, start, stop, out):
     btau = np.empty(n * LANES)
     zero = np.zeros(n * LANES)
     scratch = np.empty(12 * LANES)
-    state = np.empty((m + 1) * WIDTH * LANES)
     bias = np.empty(n * LANES)
-    poses = np.empty(12 * m * LANES)
-    composite = np.empty(10 * m * LANES)
-    screw = np.empty(12 * m * LANES)
+    # the torques' state is done with when the mass matrix begins: one workspace for both stays in the nearest cache
+    state = np.empty(max(WIDTH * (m + 1), 34 * m) * LANES)
+    poses = state[: 12 * m * LANES]
+    composite = state[12 * m * LANES : 22 * m * LANES]
+    screw = state[22 * m * LANES :]
     M = np.empty(n * (n + 1) // 2 * LANES)
     size = np.empty(n * LANES)
     origin = np.zeros(3)

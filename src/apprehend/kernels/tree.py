@@ -117,21 +117,56 @@ def shift_block(q, coordinate, multiplier, offset, poses, target):
 
 
 @kernel
+def revolve_through(place, i, q, coordinate, multiplier, offset, poses, parent, scratch):
+    """`carry_through` and `turn_block` in one pass, for a joint i with a parent joint."""
+    L = LANES
+    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
+    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
+    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
+    x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    t = at(i, 12)
+    p = at(parent, 12)
+    d = at(coordinate, 1)
+    for c in range(12 * L):
+        scratch[c] = poses[p + c]
+    for lane in range(L):
+        s, c = sincos(multiplier * q[d + lane] + offset)
+        for k in range(3):
+            a0 = scratch[3 * k * L + lane]
+            a1 = scratch[(3 * k + 1) * L + lane]
+            a2 = scratch[(3 * k + 2) * L + lane]
+            b0 = a0 * r00 + a1 * r10 + a2 * r20
+            b1 = a0 * r01 + a1 * r11 + a2 * r21
+            poses[t + 3 * k * L + lane] = b0 * c + b1 * s
+            poses[t + (3 * k + 1) * L + lane] = b1 * c - b0 * s
+            poses[t + (3 * k + 2) * L + lane] = a0 * r02 + a1 * r12 + a2 * r22
+            poses[t + (9 + k) * L + lane] = scratch[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
+
+
+@kernel(inline=True)
 def tree_block(model, q, value, poses):
     """Moved frames of all joints, ``poses (12 * m * LANES)``, of ``q (n * LANES)``; *value* ``(LANES)`` is scratch."""
     gain = model.gain
     coordinate = model.coordinate
     near = within_sincos(q, model)
     scratch = np.empty(12 * LANES)
-    for i in range(model.kind.shape[0]):
-        carry_through(model.place, i, poses, model.parent[i], i, scratch)
-        if model.kind[i] == PRISMATIC:
+    parents = model.parent
+    kind = model.kind
+    place = model.place
+    for i in range(kind.shape[0]):
+        parent = parents[i]
+        if kind[i] == PRISMATIC:
+            carry_through(place, i, poses, parent, i, scratch)
             shift_block(q, coordinate[i], gain[i, 0], gain[i, 1], poses, i)
-        elif near:
+        elif not near:
+            wrap_angles(q, coordinate[i], gain[i, 0], gain[i, 1], value)
+            carry_through(place, i, poses, parent, i, scratch)
+            turn_block(value, 0, 1.0, 0.0, poses, i)
+        elif parent < 0:
+            carry_through(place, i, poses, parent, i, scratch)
             turn_block(q, coordinate[i], gain[i, 0], gain[i, 1], poses, i)
         else:
-            wrap_angles(q, coordinate[i], gain[i, 0], gain[i, 1], value)
-            turn_block(value, 0, 1.0, 0.0, poses, i)
+            revolve_through(place, i, q, coordinate[i], gain[i, 0], gain[i, 1], poses, parent, scratch)
 
 
 @kernel

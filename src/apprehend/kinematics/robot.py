@@ -21,7 +21,7 @@ from ..kernels.chain import ChainModel
 from ..kernels.coriolis import coriolis_matrix
 from ..kernels.tree import TreeModel
 from ..robots.description import Description, Joint, JointType
-from . import differential, dynamics
+from . import differential, dynamics, memory
 from .model import chain_model, frame_names, tree_model
 
 GRAIN = 2048
@@ -192,11 +192,11 @@ class Robot:
         count = math.prod(q.shape[:-1])
         rows = q.reshape(count, self.n)
         if frame is None:
-            out = np.empty((count, len(self.frame_names), 16))
+            out = memory.empty(count, len(self.frame_names), 16)
             tree = self.model
             self._batch(lambda a, b: tree_kernels.tree_poses(tree, rows, a, b, out), q, count)
             return out.reshape(*q.shape[:-1], len(self.frame_names), 4, 4)
-        out = np.empty((count, 16))
+        out = memory.empty(count, 16)
         chain = self.chain_model(frame)
         self._batch(lambda a, b: chain_kernels.chain_poses(chain, rows, a, b, out), q, count)
         return out.reshape(*q.shape[:-1], 4, 4)
@@ -237,8 +237,8 @@ class Robot:
             return J, T
         count = math.prod(q.shape[:-1])
         rows = q.reshape(count, self.n)
-        T = np.empty((count, 16)) if poses else _NO_POSES
-        J = np.empty((count, 6, self.n))
+        T = memory.empty(count, 16) if poses else _NO_POSES
+        J = memory.empty(count, 6, self.n)
         self._batch(lambda a, b: chain_kernels.chain_jacobians(chain, rows, a, b, kind, J, T), q, count)
         return J.reshape(*q.shape[:-1], 6, self.n), T.reshape(*q.shape[:-1], 4, 4) if poses else T
 
@@ -251,7 +251,7 @@ class Robot:
         joint friction and damping are not.
         """
         shape, rows = self.read_rows(q=q, qd=qd, qdd=qdd)
-        out = np.empty((math.prod(shape), self.n))
+        out = memory.empty(math.prod(shape), self.n)
         bad = dynamics.inverse_dynamics(self.model, rows[0], rows[1], rows[2], out)
         if bad >= 0:
             self._refuse_one(bad % 4 - 1, q=q, qd=qd, qdd=qdd)
@@ -265,7 +265,7 @@ class Robot:
         """Joint-space inertia M(q), ``(..., n, n)``, symmetric (composite rigid bodies)."""
         q = self._read(q)
         count = math.prod(q.shape[:-1])
-        out = np.empty((count, self.n, self.n))
+        out = memory.empty(count, self.n, self.n)
         if dynamics.mass_matrix(self.model, q.reshape(count, self.n), out) >= 0:
             self._refuse(q)
         return out.reshape(*q.shape[:-1], self.n, self.n)
@@ -276,7 +276,7 @@ class Robot:
         Raises `InputError` if the mass matrix is singular: a joint that moves no inertia.
         """
         shape, rows = self.read_rows(q=q, qd=qd, tau=tau)
-        out = np.empty((math.prod(shape), self.n))
+        out = memory.empty(math.prod(shape), self.n)
         bad, row, coordinate = dynamics.forward_dynamics(self.model, rows[0], rows[1], rows[2], out)
         if bad >= 0:
             self._refuse_one(bad % 4 - 1, q=q, qd=qd, tau=tau)
