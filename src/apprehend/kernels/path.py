@@ -116,12 +116,14 @@ def upper_bound(breaks, coefficients, order, sign, tolerance, bound, where):
                         place = breaks[k + 1]
                     continue
                 depth = 1
-                stack[0] = b
+                for p in range(m):
+                    stack[0, p] = b[p]
                 span[0, 0] = breaks[k]
                 span[0, 1] = breaks[k + 1]
                 while depth > 0:
                     depth -= 1
-                    b[:] = stack[depth]
+                    for p in range(m):
+                        b[p] = stack[depth, p]
                     lo = span[depth, 0]
                     hi = span[depth, 1]
                     top = b[0]
@@ -141,10 +143,11 @@ def upper_bound(breaks, coefficients, order, sign, tolerance, bound, where):
                         continue
                     _split(b, left, right)
                     mid = 0.5 * (lo + hi)
-                    stack[depth] = left
+                    for p in range(m):
+                        stack[depth, p] = left[p]
+                        stack[depth + 1, p] = right[p]
                     span[depth, 0] = lo
                     span[depth, 1] = mid
-                    stack[depth + 1] = right
                     span[depth + 1, 0] = mid
                     span[depth + 1, 1] = hi
                     depth += 2

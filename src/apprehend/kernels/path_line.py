@@ -51,6 +51,13 @@ def reference(helix, s, p, dp, R, work):
 
 
 @kernel
+def _copy(source, target):
+    """Element by element: a slice assignment would compile its checks and their messages."""
+    for j in range(source.shape[0]):
+        target[j] = source[j]
+
+
+@kernel
 def _damped(J, rows, free, damping, error, A, y, dq):
     """``dq = Jᵗ (J Jᵗ + damping 1)⁻¹ error`` over the first *rows* and the free columns, by Cholesky."""
     n = J.shape[1]
@@ -166,7 +173,8 @@ def track(model, helix, rows, nodes, q0, lower, upper, tolerance, leap, q, dq):
     J = np.empty((6, n))
     w = np.empty(64)
     trial = np.empty(n)
-    here = q0.copy()
+    here = np.empty(n)
+    _copy(q0, here)
     slope = np.empty(n)
     if newton(model, helix, rows, nodes[0], lower, upper, tolerance, here, T, J, w) > tolerance:
         return LOST, 0, nodes[0]
@@ -195,14 +203,14 @@ def track(model, helix, rows, nodes, q0, lower, upper, tolerance, leap, q, dq):
                 if residual > tolerance or jump > leap:
                     step *= 0.5
                     if step < smallest:
-                        q[k] = trial
+                        _copy(trial, q[k])
                         return (LOST if residual > tolerance else LEAP), k, s
                     continue
-                here[:] = trial
+                _copy(trial, here)
                 s = ahead
-        q[k] = here
+        _copy(here, q[k])
         tangent(model, helix, rows, nodes[k], here, T, J, w, slope)
-        dq[k] = slope
+        _copy(slope, dq[k])
     return OK, nodes.shape[0], nodes[-1]
 
 
@@ -324,7 +332,7 @@ def fewest(model, helix, rows, lever, nodes, q, dq, lower, upper, tolerance, dev
     trial = np.empty(n)
     chosen = np.empty(n)
     s_out[0] = nodes[0]
-    q_out[0] = q[0]
+    _copy(q[0], q_out[0])
     count = 1
     end = nodes[-1]
     step = 0.1 * (end - nodes[0])
@@ -343,7 +351,7 @@ def fewest(model, helix, rows, lever, nodes, q, dq, lower, upper, tolerance, dev
             used = max(far / deviation, off / angle)
             if used <= 1.0:
                 good = b
-                chosen[:] = trial
+                _copy(trial, chosen)
                 bounds[count - 1, 0] = far
                 bounds[count - 1, 1] = off
                 if b >= end:
@@ -362,6 +370,6 @@ def fewest(model, helix, rows, lever, nodes, q, dq, lower, upper, tolerance, dev
             return THIN, count
         step = good - a
         s_out[count] = good
-        q_out[count] = chosen
+        _copy(chosen, q_out[count])
         count += 1
     return OK, count
