@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +29,26 @@ def load_shape_mesh(shape: Shape) -> tuple[Array, IntArray]:
     """
     if shape.kind is not ShapeKind.MESH or shape.mesh is None:
         raise MeshError(f"shape {shape.name!r} is a {shape.kind.value}, not a mesh")
-    vertices, faces = read_mesh(shape.mesh)
+    vertices, faces = _cached(shape.mesh, _stamp(shape.mesh))
     scale = np.asarray(shape.size)
     if np.prod(scale) < 0:
         faces = faces[:, ::-1]
     return np.ascontiguousarray(vertices * scale), np.ascontiguousarray(faces)
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """What tells one state of a file from another: time of change in ns and size; zeros for a file that is missing."""
+    try:
+        found = path.stat()
+    except OSError:
+        return 0, 0
+    return found.st_mtime_ns, found.st_size
+
+
+@lru_cache(maxsize=256)
+def _cached(path: Path, stamp: tuple[int, int]) -> tuple[Array, IntArray]:
+    """`read_mesh`, once for every state of a file: the hand, the collision checks and the simulation all ask."""
+    return read_mesh(path)
 
 
 def read_mesh(path: Path) -> tuple[Array, IntArray]:
