@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -56,6 +57,17 @@ def test_a_slider_is_measured_as_it_was_made() -> None:
     assert np.allclose(T[:3, 3], [0, 0, 0.09], atol=1e-3)
     assert np.allclose(T[:3, 2], [0, 0, 1], atol=1e-9)
     assert np.allclose(np.abs(T[:3, 0]), [0, 1, 0], atol=1e-9)
+
+
+def test_what_has_no_collision_geometry_is_as_large_as_it_looks() -> None:
+    hand = sliding()
+    description = hand.robot.description
+    links = dict(description.links)
+    for name in ("a", "palm"):
+        links[name] = dataclasses.replace(links[name], visuals=links[name].collisions, collisions=())
+    seen = Hand(Robot(dataclasses.replace(description, links=links))).jaw
+    assert np.array_equal(seen.tcp_at(0.02), hand.jaw.tcp_at(0.02))
+    assert (seen.max_width, seen.finger_depth) == (hand.jaw.max_width, hand.jaw.finger_depth)
 
 
 def test_two_motors_hold_with_the_weaker() -> None:

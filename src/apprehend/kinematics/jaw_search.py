@@ -83,15 +83,16 @@ def _surfaces(robot: Robot) -> _Surfaces:
     for joint in description.joints:
         if joint.type is not JointType.FIXED or joint.parent in moving:
             moving.add(joint.child)
-    for visual in (False, True):
-        triangles = {}
-        for name, link in description.links.items():
-            vertices, faces = link_surface(link, visual=visual)
-            if len(faces):
-                triangles[name] = vertices[faces]
-        if triangles.keys() & moving and len(triangles) > 1:
-            return _Surfaces(robot, triangles, frozenset(moving))
-    raise DescriptionError(f"hand {robot.name!r}: its fingers have no geometry, so that no jaw can be found")
+    triangles = {}
+    for name, link in description.links.items():
+        vertices, faces = link_surface(link)
+        if not len(faces):  # a part without collision geometry is as large as it looks
+            vertices, faces = link_surface(link, visual=True)
+        if len(faces):
+            triangles[name] = vertices[faces]
+    if not triangles.keys() & moving or len(triangles) < 2:
+        raise DescriptionError(f"hand {robot.name!r}: its fingers have no geometry, so that no jaw can be found")
+    return _Surfaces(robot, triangles, frozenset(moving))
 
 
 def _try_direction(surfaces: _Surfaces, opened: Array, closed: Array) -> ParallelJaw | None:
@@ -240,7 +241,7 @@ def _first_touch(
     if touching[0] == 0:
         return 0.0
     low, high = float(steps[touching[0] - 1]), float(steps[touching[0]])
-    while high - low > 1e-7:
+    while high - low > 1e-5:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if gap(middle) > 0.0 else (low, middle)
     return low

@@ -56,6 +56,8 @@ class MeshPaths:
     def __init__(self, source: Path, packages: Packages) -> None:
         self.folder = source.resolve().parent
         self.named: dict[str, Path] = {}
+        self._roots: dict[str, list[Path]] = {}
+        self._folders: dict[Path, Path] = {}
         self.guessed: dict[str, Path] = {}
         """Packages that were not found by name, and the folder that was taken for them."""
         self.folders: list[Path] = []
@@ -94,7 +96,7 @@ class MeshPaths:
             )
         refused: Path | None = None
         for path, allowed in candidates:
-            real = path.resolve()
+            real = self._real(path)
             if not any(real.is_relative_to(a) for a in allowed):
                 refused = refused or real
             elif real.is_file():
@@ -121,7 +123,20 @@ class MeshPaths:
                             f"expected one of {', '.join(MESH_SUFFIXES)}")  # fmt: skip
         return path
 
+    def _real(self, path: Path) -> Path:
+        """*path* without symbolic links and ``..``; folders are resolved once."""
+        folder = self._folders.get(path.parent)
+        if folder is None:
+            folder = self._folders[path.parent] = path.parent.resolve()
+        real = folder / path.name
+        return real.resolve() if path.name == ".." or real.is_symlink() else real
+
     def _package_folders(self, package: str) -> list[Path]:
+        if package not in self._roots:
+            self._roots[package] = self._find_package(package)
+        return self._roots[package]
+
+    def _find_package(self, package: str) -> list[Path]:
         if package in self.named:
             return [self.named[package]]
         candidates = [f / package for f in self.folders] + [f for f in self.folders if f.name == package]
