@@ -4,7 +4,8 @@ from .candidates import Candidate, GraspPlan, PlanStatus
 from .closure import Closure, ClosureStatus, closed
 from .contact import Contact, ContactModel
 from .files import read_grasp
-from .forces import ContactForces, ForceBatch, ForceStatus, Limits
+from .force_program import Limits
+from .forces import ContactForces, ForceBatch, ForceStatus
 from .grasp import Grasp
 from .hand_grasp import HandGrasp, hand_jacobian
 from .jaw_plan import plan

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..arrays import Array
 from .contact import Contact, ContactModel
-from .forces import ContactForces, ForceStatus, Limits, build, run
+from .force_program import Limits, build, joint_torques, run, torque_bounds
+from .forces import ContactForces, ForceStatus
 
 if TYPE_CHECKING:
     from .grasp import Grasp
@@ -32,7 +33,7 @@ def analytic_centre(grasp: Grasp, wrench: Array, limits: Limits, weights: Array)
     f = program.maps @ answer.x[0] * size[0]
     p = grasp.wrench_size
     start = _single(
-        grasp, program, answer, f, float(program.sign * answer.primal[0] * size[0]), 0.0, wrench, answer.y[0, :p].copy()
+        grasp, program, answer, f, float(program.sign * answer.primal[0] * size[0]), 0.0, answer.y[0, :p].copy()
     )
     if start.status is ForceStatus.INFEASIBLE:
         return replace(start, forces=np.zeros_like(f), value=np.inf, bound=np.inf)
@@ -65,14 +66,11 @@ def analytic_centre(grasp: Grasp, wrench: Array, limits: Limits, weights: Array)
                 break
     value = _barrier(grasp, f, cost, rows, right, 0.0)[0]
     done = decrement < 1e-4
-    slack = np.array([float(c.slack(f[s])) for c, s in zip(grasp.contacts, grasp.slices, strict=True)])
-    J = program.torque
-    torques = J[0].T @ f + J[1] if J is not None else np.zeros(0)
     allowance = decrement**2 + LIMIT_WEIGHTS[-1] * len(rows)
     residual = float(np.abs(G @ f + wrench).max() / (1.0 + np.abs(wrench).max()))
     return ContactForces(
-        ForceStatus.OPTIMAL if done else ForceStatus.INACCURATE, f, value, value - allowance, residual, slack, (),
-        torques, np.zeros(p), steps,
+        ForceStatus.OPTIMAL if done else ForceStatus.INACCURATE, f, value, value - allowance, residual, np.zeros(p),
+        steps, grasp, (), program.torque,
     )  # fmt: skip
 
 
@@ -93,7 +91,6 @@ def _limit_rows(grasp: Grasp, limits: Limits) -> tuple[Array, Array]:
     """``rows f ≤ right`` of all finite limits."""
     from ..arrays import as_vector
     from .closure import _normals, normal_index
-    from .forces import _torque, _torque_bounds
 
     rows, right = [], []
     m = grasp.matrix.shape[1]
@@ -105,10 +102,10 @@ def _limit_rows(grasp: Grasp, limits: Limits) -> tuple[Array, Array]:
     if limits.total is not None:
         rows.append(_normals(grasp))
         right.append(float(limits.total))
-    torque = _torque(grasp, limits)
+    torque = joint_torques(grasp, limits)
     if torque is not None:
         J, offset = torque
-        lower, upper = _torque_bounds(limits, J.shape[1])
+        lower, upper = torque_bounds(limits, J.shape[1])
         rows += [*J.T, *(-J.T)]
         right += [*(upper - offset), *(offset - lower)]
     A, b = np.array(rows).reshape(-1, m), np.array(right)

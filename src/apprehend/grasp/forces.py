@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,8 @@ from ..arrays import Array, BoolArray, IntArray, as_array, as_shaped, as_vector,
 from ..errors import InputError
 from ..kernels import cone as kernel
 from ..result import Result, Status
-from .program import Solutions, solve
+from .force_program import NO_LIMITS, Limits, Program, build, run
+from .program import Solutions
 
 if TYPE_CHECKING:
     from .grasp import Grasp
@@ -40,32 +42,13 @@ _CODES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Limits:
-    """What contact forces must respect besides the friction cones; None: no limit.
-
-    *normal*: largest normal force, one number or one per contact; *total*: of their sum; *hand_jacobian* ``(m, n)``
-    with *torque_lower*, *torque_upper* ``(n,)`` (or one number, or ``(−x, x)`` from *torque_upper* alone) and
-    *torque_offset* ``(n,)``: ``lower ≤ J_Hᵗ f + offset ≤ upper`` (motor limits pass through a transmission by
-    multiplying *hand_jacobian* with it).
-    """
-
-    normal: ArrayLike | None = None
-    total: float | None = None
-    hand_jacobian: ArrayLike | None = None
-    torque_lower: ArrayLike | None = None
-    torque_upper: ArrayLike | None = None
-    torque_offset: ArrayLike | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class ContactForces(Result):
     """Forces for one wrench.
 
     *forces* ``(m,)``, contact by contact; *value* of the objective and *bound*, its certified lower bound (upper bound
-    of ``max_margin``); *residual*: largest violation of balance, relative. *slack* ``(k,)``: how far each force is
-    inside its cone (see `Contact.slack`). *active*: names of limits that are reached. For INFEASIBLE,
-    *certificate* ``(p,)`` is a direction d of scaled wrench space with ``d · (−w) > 0`` although no allowed contact
-    force pushes along it by more than the limits give: the proof; the forces are zero then.
+    of ``max_margin``); *residual*: largest violation of balance, relative. For INFEASIBLE the forces are zero, and
+    *certificate* ``(p,)`` is the proof: a direction d of scaled wrench space with ``d · (−w) > 0``, although no allowed
+    contact force pushes along it by more than the limits give.
     """
 
     status: ForceStatus
@@ -73,16 +56,35 @@ class ContactForces(Result):
     value: float
     bound: float
     residual: float
-    slack: Array
-    active: tuple[str, ...]
-    torques: Array
     certificate: Array
     steps: int
+    grasp: Grasp
+    reached: tuple[str, ...] = ()
+    torque: tuple[Array, Array] | None = None
 
     @property
     def gap(self) -> float:
         """|value − bound|."""
         return abs(self.value - self.bound)
+
+    @cached_property
+    def slack(self) -> Array:
+        """How far each contact's force is inside its cone ``(k,)`` (see `Contact.slack`)."""
+        pairs = zip(self.grasp.contacts, self.grasp.slices, strict=True)
+        return np.array([float(c.slack(self.forces[s])) for c, s in pairs])
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Names of the limits and friction cones that are reached."""
+        if not self.success:
+            return ()
+        near = ACTIVE * (1.0 + float(np.abs(self.forces).max()))
+        return (*self.reached, *(f"friction cone of contact {i}" for i, s in enumerate(self.slack) if s < near))
+
+    @property
+    def torques(self) -> Array:
+        """Joint torques ``J_Hᵗ f + offset`` ``(n,)``; empty without a hand Jacobian in the limits."""
+        return np.zeros(0) if self.torque is None else self.torque[0].T @ self.forces + self.torque[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,231 +110,6 @@ class ForceBatch:
         return _CODES[int(self.codes[i])]
 
 
-@dataclass
-class Program:
-    """The cone program of a grasp, an objective and limits; only its right-hand side depends on the wrench.
-
-    ``A x = b0 − B w``, forces ``f = maps x``.
-    """
-
-    A: Array
-    b0: Array
-    B: Array
-    c: Array
-    Q: Array
-    cones: tuple[int, ...]
-    maps: Array
-    sign: float
-    homogeneous: bool
-    names: dict[int, str] = field(default_factory=dict)  # column of a limit's slack → name
-    torque: tuple[Array, Array] | None = None  # J_H, offset
-
-    def __post_init__(self) -> None:
-        U, s, _ = np.linalg.svd(self.A)
-        rank = int((s > 1e-11 * max(float(s[0]), 1e-300)).sum())
-        self.onto, self.missed = (
-            U[:, :rank],
-            U[:, rank:],
-        )  # dependent rows make two answers possible: none, or fewer rows
-
-
-class _Builder:
-    """Columns (cones) and rows (equations) put together piece by piece."""
-
-    def __init__(self) -> None:
-        self.cones: list[int] = []
-        self.n = 0
-        self.rows: list[tuple[dict[int, float] | Array, float]] = []
-
-    def cone(self, size: int) -> int:
-        """A new cone; the column where it starts."""
-        self.cones.append(size)
-        self.n += size
-        return self.n - size
-
-    def equation(self, row: dict[int, float] | Array, right: float) -> None:
-        """A new equation; *row* by column, or dense over the columns so far."""
-        self.rows.append((row, right))
-
-    def arrays(self) -> tuple[Array, Array]:
-        """A and b."""
-        A, b = np.zeros((len(self.rows), self.n)), np.zeros(len(self.rows))
-        for i, (row, right) in enumerate(self.rows):
-            b[i] = right
-            if isinstance(row, dict):
-                for j, v in row.items():
-                    A[i, j] = v
-            else:
-                A[i, : len(row)] = row
-        return A, b
-
-
-def build(grasp: Grasp, objective: str, limits: Limits, weights: Array | None = None) -> Program:
-    """The cone program for an objective and limits."""
-    from .closure import _stacked, normal_index
-
-    G = grasp.matrix * grasp.scale[:, None]
-    p, k, m = grasp.wrench_size, len(grasp), G.shape[1]
-    maps, e, links = _stacked(grasp)
-    builder = _Builder()
-    for cc in grasp.cones:
-        for size in cc.cones:
-            builder.cone(size)
-    margin, unit = -1, 1.0
-    if objective == "max_margin":  # f = maps (x + t e'), with the smallest eigenvalue of P as t
-        margin = builder.cone(1)
-        shift = e * _eigen_units(grasp)
-        unit = float(shift.max())  # t is counted in the finest of these, so that its column is of order one
-        shift = shift / unit
-        maps = np.column_stack([maps, maps @ shift])
-        links = np.column_stack([links, links @ shift])
-    for row in G @ maps:
-        builder.equation(row, 0.0)
-    for row in links:
-        builder.equation(row, 0.0)
-    normal_rows = []
-    for contact, s in zip(grasp.contacts, grasp.slices, strict=True):
-        normal_rows.append(maps[s.start + normal_index(contact)])
-    names: dict[int, str] = {}
-    homogeneous = True
-    if limits.normal is not None:
-        most = as_vector(limits.normal, "limits.normal", k)
-        for i in range(k):
-            if np.isfinite(most[i]):
-                _upper(builder, normal_rows[i], float(most[i]), names, f"normal force of contact {i}")
-                homogeneous = False
-    if limits.total is not None:
-        _upper(builder, np.sum(normal_rows, axis=0), float(limits.total), names, "sum of normal forces")
-        homogeneous = False
-    torque = _torque(grasp, limits)
-    if torque is not None:
-        J, offset = torque
-        lower, upper = _torque_bounds(limits, J.shape[1])
-        for j in range(J.shape[1]):
-            row = J[:, j] @ maps
-            if np.isfinite(upper[j]):
-                _upper(builder, row, float(upper[j] - offset[j]), names, f"upper torque of joint {j}")
-            if np.isfinite(lower[j]):
-                _upper(builder, -row, float(offset[j] - lower[j]), names, f"lower torque of joint {j}")
-            homogeneous &= not (np.isfinite(upper[j]) or np.isfinite(lower[j]))
-    c, Q = {}, np.zeros(0)
-    w = np.ones(k) if weights is None else weights
-    if objective == "min_normal":
-        c = {j: float(v) for j, v in enumerate(w @ np.array(normal_rows))}
-    elif objective == "min_norm":
-        Q = _squares(grasp, maps)
-    elif objective == "min_largest":
-        t = builder.cone(1)
-        for row in normal_rows:
-            rest = builder.cone(1)
-            builder.equation({**_sparse(row), rest: 1.0, t: -1.0}, 0.0)
-        c = {t: 1.0}
-    elif objective == "min_largest_norm":
-        t = builder.cone(1)
-        for s in grasp.slices:
-            count = min(s.stop - s.start, grasp.dimension)  # the moment of a soft finger is not a force
-            u = builder.cone(1 + count)
-            builder.equation({u: 1.0, t: -1.0}, 0.0)
-            for j, component in enumerate(range(s.start, s.start + count)):
-                builder.equation({**_sparse(maps[component]), u + 1 + j: -1.0}, 0.0)
-        c = {t: 1.0}
-    elif objective == "max_margin":
-        c = {margin: -1.0}
-    elif objective == "min_torque":
-        if torque is None:
-            raise InputError('objective "min_torque" needs limits.hand_jacobian')
-        J, offset = torque
-        u = builder.cone(1 + J.shape[1])
-        for j in range(J.shape[1]):
-            builder.equation({**_sparse(J[:, j] @ maps), u + 1 + j: -1.0}, -float(offset[j]))
-            homogeneous &= bool(offset[j] == 0.0)
-        c = {u: 1.0}
-    A, b0 = builder.arrays()
-    cost = np.zeros(builder.n)
-    for j, v in c.items():
-        cost[j] = v
-    full_Q = np.zeros(builder.n)
-    full_Q[: len(Q)] = Q
-    full_maps = np.zeros((m, builder.n))
-    full_maps[:, : maps.shape[1]] = maps
-    B = np.zeros((len(A), p))
-    B[:p] = np.diag(grasp.scale)
-    sign = -1.0 / unit if objective == "max_margin" else 1.0
-    return Program(A, b0, B, cost, full_Q, tuple(builder.cones), full_maps, sign, homogeneous, names, torque)
-
-
-def _sparse(row: Array) -> dict[int, float]:
-    return {int(j): float(row[j]) for j in np.nonzero(row)[0]}
-
-
-def _upper(builder: _Builder, row: Array, right: float, names: dict[int, str], name: str) -> None:
-    """``row x + s = right`` with a slack s ≥ 0, scaled to a unit right-hand side where that is not tiny."""
-    scale = max(abs(right), 1e-9)
-    s = builder.cone(1)
-    names[s] = name
-    builder.equation({**_sparse(row / scale), s: 1.0}, right / scale)
-
-
-def _eigen_units(grasp: Grasp) -> Array:
-    """By cone coordinate: the shift of x₀ that lowers the smallest eigenvalue of P by one."""
-    units = []
-    for contact, cc in zip(grasp.contacts, grasp.cones, strict=True):
-        mu, gamma = contact.friction, contact.torsion
-        for i, size in enumerate(cc.cones):
-            if contact.size == 1 or (size == 4):
-                unit = 1.0
-            elif i == 0:
-                unit = 1.0 / max(mu, 1e-12)
-            else:
-                unit = 1.0 / max(gamma, 1e-12)
-            units += [unit] + [0.0] * (size - 1)
-    return np.array(units)
-
-
-def _squares(grasp: Grasp, maps: Array) -> Array:
-    """Diagonal Q with ``½ xᵀ Q x = ‖f‖²`` on the cone program's feasible set."""
-    Q: Array = 2.0 * (maps**2).sum(axis=0)
-    column = 0
-    for contact, cc in zip(grasp.contacts, grasp.cones, strict=True):
-        if len(cc.cones) == 3:  # τ = γ (u − v) / 2 with u + v = 2 f₃: τ² = γ² (u² + v²) / 2 − γ² f₃²
-            gamma = contact.torsion
-            if gamma > 1.0:
-                raise InputError(
-                    f"torsion γ is {gamma} m; the minimum norm with a box-shaped soft finger is convex up to 1 m"
-                )
-            Q[column] -= 2.0 * gamma**2
-            Q[column + 3] = Q[column + 4] = gamma**2
-        column += sum(cc.cones)
-    return Q
-
-
-def _torque(grasp: Grasp, limits: Limits) -> tuple[Array, Array] | None:
-    if limits.hand_jacobian is None:
-        if limits.torque_lower is not None or limits.torque_upper is not None:
-            raise InputError("torque limits are given without limits.hand_jacobian (m, n)")
-        return None
-    J = as_array(limits.hand_jacobian, "limits.hand_jacobian")
-    m = grasp.matrix.shape[1]
-    if J.ndim != 2 or len(J) != m:
-        raise InputError(f"limits.hand_jacobian has shape {J.shape}; expected ({m}, n): one row per force component")
-    n = J.shape[1]
-    offset = np.zeros(n) if limits.torque_offset is None else as_vector(limits.torque_offset, "torque_offset", n)
-    return J, offset
-
-
-def _torque_bounds(limits: Limits, n: int) -> tuple[Array, Array]:
-    upper = np.full(n, np.inf) if limits.torque_upper is None else as_vector(limits.torque_upper, "torque_upper", n)
-    if limits.torque_lower is None:
-        lower = -upper if limits.torque_upper is not None else np.full(n, -np.inf)
-    else:
-        lower = as_vector(limits.torque_lower, "torque_lower", n)
-    bad = np.nonzero(lower > upper)[0]
-    if len(bad):
-        j = int(bad[0])
-        raise InputError(f"torque limits of joint {j} exclude each other: lower {lower[j]:g} > upper {upper[j]:g}")
-    return lower, upper
-
-
 def contact_forces(
     grasp: Grasp,
     wrench: ArrayLike,
@@ -353,7 +130,7 @@ def contact_forces(
     exception. Raises `InputError` for limits without meaning.
     """
     choice(objective, "objective", OBJECTIVES)
-    limits = Limits() if limits is None else limits
+    limits = NO_LIMITS if limits is None else limits
     w = as_shaped(wrench, "wrench", grasp.wrench_size)
     weight = None if weights is None else as_vector(weights, "weights", len(grasp))
     for name, value in (("normal", limits.normal), ("total", limits.total)):
@@ -365,7 +142,7 @@ def contact_forces(
         if w.ndim != 1:
             raise InputError('objective "barrier" takes one wrench (p,) at a time')
         return analytic_centre(grasp, w, limits, np.ones(len(grasp)) if weight is None else weight)
-    key = None if limits != Limits() or weight is not None else objective
+    key = objective if limits is NO_LIMITS and weight is None else None
     cache: dict[str, Program] = grasp.__dict__.setdefault("_programs", {})
     program = cache.get(key) if key else None
     if program is None:
@@ -382,44 +159,16 @@ def contact_forces(
     certificate = np.where((answer.status == kernel.INFEASIBLE)[:, None], answer.y[:, : grasp.wrench_size], 0.0)
     if w.ndim > 1:
         return ForceBatch(forces, value, bound, answer.residual, certificate, answer.status, answer.steps)
-    return _single(grasp, program, answer, forces[0], float(value[0]), float(bound[0]), w, certificate[0])
-
-
-def run(program: Program, wrenches: Array) -> tuple[Solutions, Array]:
-    """Solve for ``wrenches (N, p)``; homogeneous programs are scaled to unit wrenches first, by *size* ``(N,)``."""
-    right = -wrenches @ program.B.T
-    size = np.ones(len(wrenches))
-    if program.homogeneous:
-        size = np.sqrt((right * right).sum(axis=1))
-        size[size == 0.0] = 1.0
-        right /= size[:, None]
-    b = right + program.b0
-    if not program.missed.shape[1]:
-        return solve(program.A[None], b, program.c[None], program.cones, program.Q[None]), size
-    answer = solve(
-        (program.onto.T @ program.A)[None], b @ program.onto, program.c[None], program.cones, program.Q[None]
-    )
-    y = answer.y @ program.onto.T
-    outside = b @ program.missed
-    squared = (outside * outside).sum(axis=1)
-    bad = squared > 1e-18 * (1.0 + (b * b).sum(axis=1))  # nothing in the range of A balances this: y with Aᵀ y = 0
-    y[bad] = outside[bad] @ program.missed.T / squared[bad, None]
-    codes = np.where(bad, kernel.INFEASIBLE, answer.status)
-    primal, dual = (np.where(bad, np.inf, v) for v in (answer.primal, answer.dual))
-    return Solutions(answer.x, y, answer.z, codes, primal, dual, answer.residual, answer.steps), size
+    return _single(grasp, program, answer, forces[0], float(value[0]), float(bound[0]), certificate[0])
 
 
 def _single(
-    grasp: Grasp, program: Program, answer: Solutions, f: Array, value: float, bound: float, w: Array, d: Array
+    grasp: Grasp, program: Program, answer: Solutions, f: Array, value: float, bound: float, d: Array
 ) -> ContactForces:
     status = _CODES[int(answer.status[0])]
-    slack = np.array([float(c.slack(f[s])) for c, s in zip(grasp.contacts, grasp.slices, strict=True)])
-    active = []
-    if status is ForceStatus.OPTIMAL:
-        active = [name for j, name in program.names.items() if answer.x[0, j] < ACTIVE]
-        active += [f"friction cone of contact {i}" for i in range(len(grasp)) if slack[i] < ACTIVE * (1.0 + f.max())]
-    J = program.torque
-    torques = J[0].T @ f + J[1] if J is not None else np.zeros(0)
+    reached: tuple[str, ...] = ()
+    if program.names and status is ForceStatus.OPTIMAL:
+        reached = tuple(name for j, name in program.names.items() if answer.x[0, j] < ACTIVE)
     return ContactForces(
-        status, f, value, bound, float(answer.residual[0]), slack, tuple(active), torques, d, int(answer.steps[0])
+        status, f, value, bound, float(answer.residual[0]), d, int(answer.steps[0]), grasp, reached, program.torque
     )

@@ -15,7 +15,8 @@ from ..errors import InputError
 from .ball import Generators
 from .closure import Closure, force_closure, form_closure
 from .contact import Contact, ContactModel
-from .forces import ContactForces, ForceBatch, Limits, contact_forces
+from .force_program import Limits
+from .forces import ContactForces, ForceBatch, contact_forces
 from .program import ContactCone, contact_cone
 from .push import Push, largest_force
 from .quality import Quality, measure

@@ -12,7 +12,8 @@ from ..arrays import Array, as_array
 from ..errors import InputError
 from ..kernels import cone as kernel
 from ..result import Result
-from .forces import ForceStatus, Limits, build
+from .force_program import Limits, build
+from .forces import ForceStatus
 from .program import solve
 
 if TYPE_CHECKING:

@@ -198,20 +198,20 @@ def _times_m(M, v, cones, starts, offsets, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _kkt(A, AM, S, M, Q, w, beta, q1, q2, cones, starts, offsets, x, y, tmp, e1, e2):  # type: ignore[no-untyped-def]
-    """``(Q + W⁻²) x − Aᵀ y = q1``, ``A x = q2``: solved with M, and refined against the true system."""
+def _kkt(A, At, AM, S, M, Q, w, beta, q1, q2, cones, starts, offsets, x, y, tmp, e1, e2):  # type: ignore[no-untyped-def]
+    """``(Q + W⁻²) x − Aᵀ y = q1``, ``A x = q2``: solved with M, and refined once against the true system."""
     rows, n = A.shape
     for r in range(rows):
-        t = q2[r]
+        t = 0.0
         for j in range(n):
-            t -= AM[r, j] * q1[j]
-        y[r] = t
+            t += AM[r, j] * q1[j]
+        y[r] = q2[r] - t
     _solve_factor(S, rows, y)
     for j in range(n):
-        tmp[j] = q1[j]
-    for r in range(rows):
-        for j in range(n):
-            tmp[j] += A[r, j] * y[r]
+        t = q1[j]
+        for r in range(rows):
+            t += At[j, r] * y[r]
+        tmp[j] = t
     _times_m(M, tmp, cones, starts, offsets, x)
     for i in range(cones.shape[0]):  # e1 = q1 − (Q + W⁻²) x + Aᵀ y
         k, s = cones[i], starts[i]
@@ -223,15 +223,18 @@ def _kkt(A, AM, S, M, Q, w, beta, q1, q2, cones, starts, offsets, x, y, tmp, e1,
         for j in range(s + 1, s + k):
             e1[j] = tmp[j] - Q[j] * x[j] - h * (x[j] - 2.0 * w[j] * dot)
     for r in range(rows):
-        t = q2[r]
+        t = 0.0
         for j in range(n):
-            t -= A[r, j] * x[j] + AM[r, j] * e1[j]
-        e2[r] = t
+            t += A[r, j] * x[j] + AM[r, j] * e1[j]
+        e2[r] = q2[r] - t
     _solve_factor(S, rows, e2)
     for r in range(rows):
         y[r] += e2[r]
-        for j in range(n):
-            e1[j] += A[r, j] * e2[r]
+    for j in range(n):
+        t = e1[j]
+        for r in range(rows):
+            t += At[j, r] * e2[r]
+        e1[j] = t
     _times_m(M, e1, cones, starts, offsets, tmp)
     for j in range(n):
         x[j] += tmp[j]
@@ -253,6 +256,7 @@ def solve(A, b, c, Q, cones, starts, offsets, tolerance, limit, x, y, z, status,
     short = np.empty((8, rows))
     beta = np.empty(cones.shape[0])
     M, AM, S = np.empty(offsets[-1]), np.empty((rows, n)), np.empty((rows, rows))
+    At = np.empty((n, rows))
     low = np.empty((widest, widest))
     best = np.empty(2 * n + rows)
     for p in range(x.shape[0]):
@@ -260,13 +264,13 @@ def solve(A, b, c, Q, cones, starts, offsets, tolerance, limit, x, y, z, status,
         cc, qq = c[p if c.shape[0] > 1 else 0], Q[p if Q.shape[0] > 1 else 0]
         status[p] = _one(
             a, bb, cc, qq, cones, starts, offsets, tolerance, limit, x[p], y[p], z[p], measures[p],
-            work, short, beta, M, AM, S, low, best,
+            work, short, beta, M, At, AM, S, low, best,
         )  # fmt: skip
 
 
 @kernel
 def _one(A, b, c, Q, cones, starts, offsets, tolerance, limit, X, Y, Z, measures,
-         work, short, beta, M, AM, S, low, best):  # type: ignore[no-untyped-def]  # fmt: skip
+         work, short, beta, M, At, AM, S, low, best):  # type: ignore[no-untyped-def]  # fmt: skip
     rows, n = A.shape
     w, lam, x1, x2, q1, tmp = work[0], work[1], work[2], work[3], work[4], work[5]
     dx, dz, wx, wz, rd, e1, ds = work[6], work[7], work[8], work[9], work[10], work[11], work[12]
@@ -276,6 +280,8 @@ def _one(A, b, c, Q, cones, starts, offsets, tolerance, limit, X, Y, Z, measures
     for r in range(rows):
         Y[r] = 0.0
         nb = max(nb, abs(b[r]))
+        for j in range(n):
+            At[j, r] = A[r, j]
     for i in range(cones.shape[0]):
         for j in range(starts[i], starts[i] + cones[i]):
             X[j] = 1.0 if j == starts[i] else 0.0
@@ -291,14 +297,18 @@ def _one(A, b, c, Q, cones, starts, offsets, tolerance, limit, X, Y, Z, measures
             mu += X[j] * Z[j]
             cx += c[j] * X[j]
         for r in range(rows):
-            t = -b[r] * tau
+            t = 0.0
             for j in range(n):
                 t += A[r, j] * X[j]
-                rd[j] -= A[r, j] * Y[r]
+            t -= b[r] * tau
             rp[r] = t
             by += b[r] * Y[r]
             ep = max(ep, abs(t))
         for j in range(n):
+            t = 0.0
+            for r in range(rows):
+                t += At[j, r] * Y[r]
+            rd[j] -= t
             ed = max(ed, abs(rd[j]))
         mu /= degree
         rg = kappa + cx - by + quad / tau
@@ -362,7 +372,7 @@ def _one(A, b, c, Q, cones, starts, offsets, tolerance, limit, X, Y, Z, measures
         _factor(S, rows)
         for j in range(n):
             q1[j] = -c[j]
-        _kkt(A, AM, S, M, Q, w, beta, q1, b, cones, starts, offsets, x2, y2, tmp, e1, e2)
+        _kkt(A, At, AM, S, M, Q, w, beta, q1, b, cones, starts, offsets, x2, y2, tmp, e1, e2)
         den = -kappa / tau - quad / (tau * tau)
         for j in range(n):
             den += (c[j] + 2.0 * Q[j] * X[j] / tau) * x2[j]
@@ -384,7 +394,7 @@ def _one(A, b, c, Q, cones, starts, offsets, tolerance, limit, X, Y, Z, measures
                 dk = kappa * tau + dtau * dkappa - sigma * mu
             for r in range(rows):
                 q2[r] = -(1.0 - sigma) * rp[r]
-            _kkt(A, AM, S, M, Q, w, beta, q1, q2, cones, starts, offsets, x1, y1, tmp, e1, e2)
+            _kkt(A, At, AM, S, M, Q, w, beta, q1, q2, cones, starts, offsets, x1, y1, tmp, e1, e2)
             t = -(1.0 - sigma) * rg + dk / tau
             for j in range(n):
                 t -= (c[j] + 2.0 * Q[j] * X[j] / tau) * x1[j]
@@ -396,10 +406,10 @@ def _one(A, b, c, Q, cones, starts, offsets, tolerance, limit, X, Y, Z, measures
                 dy[r] = y1[r] + dtau * y2[r]
             for j in range(n):
                 dx[j] = x1[j] + dtau * x2[j]
-                dz[j] = Q[j] * dx[j] + c[j] * dtau + (1.0 - sigma) * rd[j]
-            for r in range(rows):
-                for j in range(n):
-                    dz[j] -= A[r, j] * dy[r]
+                t = 0.0
+                for r in range(rows):
+                    t += At[j, r] * dy[r]
+                dz[j] = Q[j] * dx[j] + c[j] * dtau + (1.0 - sigma) * rd[j] - t
             need = max(-dtau / tau, -dkappa / kappa)
             need = max(need, max(_room(X, dx, cones, starts), _room(Z, dz, cones, starts)))
             alpha = 1.0 / max(need, 1e-30)
