@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apprehend.errors import DescriptionError
+from apprehend.errors import DescriptionError, InputError
 from apprehend.robots import Description, JointType, ShapeKind, parse_urdf, read_urdf
 from tests.robots.build import inertial, joint, link, robot, two_links, write
 
@@ -301,3 +301,73 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
         read_urdf(tmp_path / "none.urdf")
     with pytest.raises(DescriptionError, match="cannot be read"):
         read_urdf(tmp_path)
+
+
+# ---- transmissions and closed chains
+
+
+def transmission(joints: str, motors: str, name: str = "t") -> str:
+    return f'<transmission name="{name}"><type>SimpleTransmission</type>{joints}{motors}</transmission>'
+
+
+MOTOR = '<actuator name="m"><mechanicalReduction>{}</mechanicalReduction></actuator>'
+
+
+def test_transmissions_are_motors() -> None:
+    chain = (link("a"), link("b"), link("c"), joint("i", "a", "b"), joint("j", "b", "c", "fixed", ""))
+    text = robot(
+        *chain,
+        transmission('<joint name="i"/>', MOTOR.format(50)),
+        transmission('<joint name="i"/>', MOTOR.format(1)),
+        transmission('<joint name="j"/>', MOTOR.format(1)),
+        transmission('<joint name="k"/>', MOTOR.format(1)),
+        transmission('<joint name="i"/><joint name="j"/>', MOTOR.format(1)),
+        transmission("", ""),
+    )
+    d = parse_urdf(text)
+    assert [(a.name, dict(a.arms)) for a in d.actuators] == [("m", {"i": 50.0}), ("m_i", {"i": 1.0})]
+    said = problems(d)
+    for part in (
+        "a second actuator is named 'm'; called it m_i",
+        "drives the joint 'j', which is fixed; left it out",
+        "drives the joint 'k', which does not exist.",
+        "has 2 joints and 1 actuators; left it out",
+    ):
+        assert part in said
+    assert len(d.repairs) == 4
+
+
+@pytest.mark.parametrize(
+    ("ratio", "said"),
+    [("0", "mechanicalReduction is 0; expected the ratio"), ("x", "mechanicalReduction is 'x'; expected a number")],
+)
+def test_reductions_that_mean_nothing(ratio: str, said: str) -> None:
+    text = two_links('<limit lower="0" upper="1"/>').replace(
+        "</robot>", transmission('<joint name="j"/>', MOTOR.format(ratio)) + "</robot>"
+    )
+    with pytest.raises(DescriptionError, match=said):
+        parse_urdf(text)
+
+
+def test_a_closed_chain_can_be_cut() -> None:
+    inner = '<origin xyz="0 0 1"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/>'
+    four_bar = robot(
+        *(link(n) for n in "abcd"),
+        joint("ab", "a", "b", inner=inner), joint("bc", "b", "c", inner=inner), joint("ad", "a", "d", inner=inner),
+        joint("dc", "d", "c", inner=inner),
+    )  # fmt: skip
+    with pytest.raises(DescriptionError, match=r"closed chain: link 'c' is the child of joint 'bc'.* Pass loops='cut'"):
+        parse_urdf(four_bar)
+    d = parse_urdf(four_bar, loops="cut")
+    (loop,) = d.loops
+    assert (loop.name, loop.first, loop.second, loop.free) == ("dc", "d", "c", "revolute")
+    assert np.array_equal(loop.axis, [0, 1, 0])
+    assert loop.T_first[2, 3] == 1
+    assert [j.name for j in d.joints] == ["ab", "bc", "ad"]
+    assert "joint 'dc' closes a chain at 'c'; cut it, as asked" in problems(d)
+
+
+@pytest.mark.parametrize("option", ["meshes", "inertias", "loops"])
+def test_options_are_checked(option: str) -> None:
+    with pytest.raises(InputError, match=f"{option} is 'perhaps'; expected one of '"):
+        parse_urdf(robot(link("a")), **{option: "perhaps"})
