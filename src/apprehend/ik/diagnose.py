@@ -36,8 +36,7 @@ def diagnose(chain: PreparedChain, poses: Array, targets: Array, guesses: Array 
     box = request.box
     certified = np.zeros(count, dtype=bool)
     if np.isfinite(box[:3]).all():
-        distance = float(np.linalg.norm(box[:3])) * chain.reach
-        certified = chain.bound.beyond(poses, distance, float(np.linalg.norm(box[3:])))
+        certified = chain.bound.beyond(poses, *request.slack(chain.reach))
     codes[certified] = IKStatus.OUT_OF_REACH.code
     x, cost = nearest(chain, targets, guesses, request.seed)
     open_ = np.flatnonzero(~certified)

@@ -31,6 +31,10 @@ class Request:
     starts: int
     seed: int
 
+    def slack(self, reach: float) -> tuple[float, float]:
+        """How far in m and rad the frame may be from a target that counts as reached."""
+        return float(np.linalg.norm(self.box[:3])) * reach, float(np.linalg.norm(self.box[3:]))
+
     def with_(self, **changes: Any) -> Request:
         """The same with some changes."""
         return replace(self, **changes)

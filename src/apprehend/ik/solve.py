@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -64,63 +65,31 @@ def solve(
     Coordinates that do not move *frame* keep their value of *q0*, or of ``robot.home``. Joints that may make a whole
     turn are returned on the turn nearest to *q0*, or to the middle of their limits.
     """
-    T = as_pose(T, "T")
     if n_solutions < 1:
         raise InputError(f"n_solutions is {n_solutions}; expected 1 or more")
     if max_starts < 1:
         raise InputError(f"max_starts is {max_starts}; expected 1 or more")
+    poses, fill, shape = _batch(robot, as_pose(T, "T"), q0)
     chain = prepare(robot, frame)
     box, partial, free_axis = _tolerance(tolerance, chain.reach)
-    shape = T.shape[:-2]
-    if q0 is not None:
-        q0 = as_shaped(q0, "q0", robot.n)
-        try:
-            shape = np.broadcast_shapes(shape, q0.shape[:-1])
-        except ValueError as error:
-            raise InputError(f"q0 has batch shape {q0.shape[:-1]} and T {shape}; they do not broadcast") from error
-    count = math.prod(shape)
-    poses = np.ascontiguousarray(np.broadcast_to(T, (*shape, 4, 4))).reshape(count, 4, 4)
-    fill = np.broadcast_to(robot.home if q0 is None else q0, (*shape, robot.n)).reshape(count, robot.n)
     seed = 0 if rng is None else int(rng.integers(1 << 62))
     request = Request(box, partial, free_axis, n_solutions, distinct, max_starts, seed)
-    near = fill[:, chain.free] if q0 is not None else np.broadcast_to(chain.middle, (count, chain.free.size))
-    targets = chain.targets(poses)
-    guesses = None if q0 is None else chain.to_kernel(fill)
-    certified = _certified(chain, poses, box)
-    x = np.zeros((count, n_solutions, chain.free.size))
-    found, starts = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
-    codes = np.where(certified, IKStatus.OUT_OF_REACH.code, IKStatus.NOT_FOUND.code)
-    todo = np.flatnonzero(~certified)
-    if todo.size:
-        some = targets if todo.size == count else targets[todo]
-        mine = guesses if guesses is None or todo.size == count else guesses[todo]
-        if accept is None:
-            x[todo], found[todo], starts[todo] = run(chain, some, mine, request)
-        else:
-            x[todo], found[todo], starts[todo], refused = _accepted(
-                chain, some, mine, request, accept, fill[todo], near[todo]
-            )
-            codes[todo[refused]] = IKStatus.COLLISION.code
-    codes[found > 0] = IKStatus.SUCCESS.code
-    q = np.repeat(fill[:, None, :], n_solutions, axis=1)
-    values = chain.from_kernel(x, near[:, None, :])
-    failed = np.flatnonzero((found == 0) & (codes != IKStatus.COLLISION.code))
-    if diagnose and failed.size:
-        why = diagnose_failures(
-            chain, poses[failed], targets[failed], None if guesses is None else guesses[failed], request
-        )
-        codes[failed], certified[failed] = why.codes, why.certified
-        values[failed] = chain.from_kernel(why.x, near[failed])[:, None, :]
-    known = found > 0
-    known[failed] = diagnose
-    q[:, :, chain.free] = np.where(known[:, None, None], values, q[:, :, chain.free])
+    near = chain.middle[None] if q0 is None else fill[:, chain.free]
+    problem = _Problem(
+        chain, poses, chain.targets(poses), fill, near, None if q0 is None else chain.to_kernel(fill), request
+    )
+    x, found, starts, codes, certified = _search(problem, accept)
+    count = poses.shape[0]
+    limiting = np.zeros((count, robot.n), dtype=bool)
+    q = np.empty((count, n_solutions, robot.n))
+    q[:] = fill[:, None, :]
+    if found.all():
+        q[:, :, chain.free] = chain.from_kernel(x, near[:, None, :])
+    else:
+        _fill_failures(robot, problem, x, found, codes, certified, q, limiting, diagnose)
     if n_solutions > 1:
         spare = (np.arange(n_solutions) >= found[:, None]) & (found > 0)[:, None]
         q = np.where(spare[..., None], q[:, :1], q)
-    limiting = np.zeros((count, robot.n), dtype=bool)
-    at_nearest = q[failed, 0]
-    limiting[failed] = (at_nearest <= robot.limits.lower + 1e-9) | (at_nearest >= robot.limits.upper - 1e-9)
-    limiting[:, [i for i in range(robot.n) if i not in chain.free]] = False
     return IKResult(
         q=q.reshape(*shape, n_solutions, robot.n) if n_solutions > 1 else q.reshape(*shape, robot.n),
         codes=codes.reshape(shape),
@@ -134,35 +103,120 @@ def solve(
     )
 
 
-def _certified(chain: PreparedChain, poses: Array, box: Array) -> BoolArray:
-    """Which poses are certainly out of reach, whatever the joints do."""
-    if not np.isfinite(box[:3]).all():
-        return np.zeros(poses.shape[0], dtype=bool)
-    return chain.bound.beyond(poses, float(np.linalg.norm(box[:3])) * chain.reach, float(np.linalg.norm(box[3:])))
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """A batch of targets for one chain."""
+
+    chain: PreparedChain
+    poses: Array  # (N, 4, 4)
+    targets: Array  # (N, 12)
+    fill: Array  # (N, n) values of the coordinates outside the chain
+    near: Array  # (N or 1, k) where whole turns are counted from
+    guesses: Array | None  # (N, k) in kernel units
+    request: Request
+
+    def some(self, index: IntArray) -> _Problem:
+        """The targets *index* alone."""
+        if index.size == self.targets.shape[0]:
+            return self
+        near = self.near if self.near.shape[0] == 1 else self.near[index]
+        guesses = None if self.guesses is None else self.guesses[index]
+        return replace(
+            self,
+            poses=self.poses[index],
+            targets=self.targets[index],
+            fill=self.fill[index],
+            near=near,
+            guesses=guesses,
+        )
 
 
-def _accepted(
-    chain: PreparedChain,
-    targets: Array,
-    guesses: Array | None,
-    request: Request,
-    accept: Accept,
-    fill: Array,
-    near: Array,
-) -> tuple[Array, IntArray, IntArray, BoolArray]:
+def _batch(robot: Robot, T: Array, q0: ArrayLike | None) -> tuple[Array, Array, tuple[int, ...]]:
+    """Poses ``(N, 4, 4)``, joint vectors ``(N, n)`` to fill up with, and the batch shape."""
+    shape = T.shape[:-2]
+    start = robot.home
+    if q0 is not None:
+        start = as_shaped(q0, "q0", robot.n)
+        try:
+            shape = np.broadcast_shapes(shape, start.shape[:-1])
+        except ValueError as error:
+            raise InputError(f"q0 has batch shape {start.shape[:-1]} and T {shape}; they do not broadcast") from error
+    count = math.prod(shape)
+    if T.shape[:-2] != shape:
+        T = np.ascontiguousarray(np.broadcast_to(T, (*shape, 4, 4)))
+    if start.shape[:-1] != shape:
+        start = np.broadcast_to(start, (*shape, robot.n))
+    return T.reshape(count, 4, 4), start.reshape(count, robot.n), shape
+
+
+def _search(problem: _Problem, accept: Accept | None) -> tuple[Array, IntArray, IntArray, IntArray, BoolArray]:
+    """Solutions ``(N, s, k)`` in kernel units, how many, starts used, status codes, and what is certified."""
+    chain, request = problem.chain, problem.request
+    count = problem.targets.shape[0]
+    certified = np.zeros(count, dtype=bool)
+    if np.isfinite(request.box[:3]).all():
+        certified = chain.bound.beyond(problem.poses, *request.slack(chain.reach))
+    todo = np.flatnonzero(~certified)
+    part = problem.some(todo)
+    codes = np.full(count, IKStatus.NOT_FOUND.code, dtype=np.int64)
+    codes[certified] = IKStatus.OUT_OF_REACH.code
+    if accept is None:
+        x, found, starts = run(chain, part.targets, part.guesses, request)
+    else:
+        x, found, starts, refused = _accepted(part, accept)
+        codes[todo[refused]] = IKStatus.COLLISION.code
+    if todo.size < count:
+        every = np.zeros((count, *x.shape[1:])), np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
+        for whole, value in zip(every, (x, found, starts), strict=True):
+            whole[todo] = value
+        x, found, starts = every
+    codes[found > 0] = IKStatus.SUCCESS.code
+    return x, found, starts, codes, certified
+
+
+def _fill_failures(
+    robot: Robot,
+    problem: _Problem,
+    x: Array,
+    found: IntArray,
+    codes: IntArray,
+    certified: BoolArray,
+    q: Array,
+    limiting: BoolArray,
+    diagnose: bool,
+) -> None:
+    """Write solutions into q, and for the targets without, their reasons and the nearest joint vectors."""
+    chain = problem.chain
+    known = found > 0
+    values = chain.from_kernel(x, problem.near[:, None, :])
+    failed = np.flatnonzero(~known & (codes != IKStatus.COLLISION.code))
+    if diagnose and failed.size:
+        part = problem.some(failed)
+        why = diagnose_failures(chain, part.poses, part.targets, part.guesses, problem.request)
+        codes[failed], certified[failed] = why.codes, why.certified
+        values[failed] = chain.from_kernel(why.x, part.near)[:, None, :]
+        known[failed] = True
+    q[:, :, chain.free] = np.where(known[:, None, None], values, q[:, :, chain.free])
+    if diagnose and failed.size:
+        at = q[failed[:, None], 0, chain.free]
+        limiting[failed[:, None], chain.free] = (at <= chain.lower + 1e-9) | (at >= chain.upper - 1e-9)
+
+
+def _accepted(problem: _Problem, accept: Accept) -> tuple[Array, IntArray, IntArray, BoolArray]:
     """As `queue.run`, keeping only accepted solutions; also which targets had solutions, but none accepted."""
-    count, k = targets.shape[0], chain.free.size
+    chain, request, near = problem.chain, problem.request, problem.near
+    count, k = problem.targets.shape[0], chain.free.size
     x = np.zeros((count, request.wanted, k))
     found, starts = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
     refused = np.zeros(count, dtype=bool)
     todo = np.arange(count)
     for most in (max(4, 2 * request.wanted), max(32, 4 * request.wanted)):
-        mine = None if guesses is None else guesses[todo]
-        many, number, used = run(chain, targets[todo], mine, request.with_(wanted=most))
+        part = problem.some(todo)
+        many, number, used = run(chain, part.targets, part.guesses, request.with_(wanted=most))
         starts[todo] = used
         row, column = np.nonzero(np.arange(most) < number[:, None])
-        q = fill[todo[row]].copy()
-        q[:, chain.free] = chain.from_kernel(many[row, column], near[todo[row]])
+        q = part.fill[row]
+        q[:, chain.free] = chain.from_kernel(many[row, column], part.near if near.shape[0] == 1 else part.near[row])
         verdict = np.asarray(accept(q)) if row.size else np.zeros(0, dtype=bool)
         if verdict.shape != (row.size,):
             raise InputError(
