@@ -10,6 +10,8 @@ from apprehend.collision import Box, CollisionModel, Convex, RobotSource, Scene,
 from apprehend.errors import ApprehendError, InputError, UnknownNameError
 from tests.collision.makers import gantry, planar, pose, rotation
 
+RNG = np.random.default_rng(8)
+
 
 def scene(robot, *boxes: Box, **options) -> Scene:
     return Scene(robot, RobotSource("in code"), boxes=boxes, **options)
@@ -223,6 +225,23 @@ def test_motion_bound_holds() -> None:
             f = robot.frame_names.index(f"link{i}")
             moved = np.linalg.norm((corners @ (fa[f] - fb[f]).T)[:, :3], axis=1).max()
             assert moved <= np.abs(b - a) @ model.nodes[i - 1, 5:] + 1e-12
+
+
+def test_the_gradient_of_the_distance_is_its_derivative() -> None:
+    robot = planar(4)
+    model = CollisionModel(robot, scene(robot, Box("post", np.array([0.2, 0.3, 0.5]), pose(0.6, 0.7, R=rotation(RNG)))))
+    q = np.random.default_rng(7).uniform(-1.5, 1.5, (200, robot.n))
+    distance, slope = model.distance_gradient(q)
+    np.testing.assert_array_equal(distance, model.distance(q))
+    step = 1e-6
+    found = np.stack(
+        [(model.distance(q + step * e) - model.distance(q - step * e)) / (2.0 * step) for e in np.eye(robot.n)], axis=-1
+    )
+    wrong = np.abs(found - slope).max(axis=1) > 1e-4
+    assert wrong.mean() < 0.05  # kinks, where the nearest pair or the nearest feature changes
+    sliding = gantry()
+    ball = CollisionModel(sliding, scene(sliding, Box("wall", np.array([0.4, 1.0, 0.4]), pose(0.5))))
+    np.testing.assert_allclose(ball.distance_gradient(np.zeros(3))[1], [-1.0, 0.0, 0.0], atol=1e-9)
 
 
 def test_bad_arguments_are_named() -> None:

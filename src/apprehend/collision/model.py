@@ -381,6 +381,25 @@ class CollisionModel:
     def closest(self, q: ArrayLike) -> Closest:
         """Smallest signed distance for each ``q (..., n)``, with its points, normal and names."""
         rows, shape = self._rows(q)
+        distance, number, out = self._nearest(rows)
+        names = tuple(self.names_of(int(p)) for p in number)
+        points = out[:, :6].reshape(*shape, 2, 3)
+        return Closest(distance.reshape(shape), points, out[:, 6:].reshape(*shape, 3), names)
+
+    def distance_gradient(self, q: ArrayLike) -> tuple[Array, Array]:
+        """Smallest signed distance ``(...)`` for each ``q (..., n)`` and its derivative ``(..., n)`` by q.
+
+        ∂d/∂q = nᵀ (J_a(p_a) − J_b(p_b)): witness points fixed to their links, n the normal between them. Where two
+        pairs are equally near, or a face is parallel to another, it is one of the possible slopes.
+        """
+        rows, shape = self._rows(q)
+        distance, number, out = self._nearest(rows)
+        slope, model = np.zeros_like(rows), self.compiled
+        if len(rows):
+            over_ranges(lambda a, b: collide.gradients(model, rows, number, out, a, b, slope), len(rows), GRAIN)
+        return distance.reshape(shape), slope.reshape(*shape, self.robot.n)
+
+    def _nearest(self, rows: Array) -> tuple[Array, IntArray, Array]:
         model = self.compiled
         distance, number, out = np.full(len(rows), np.inf), np.full(len(rows), -1, np.int64), np.zeros((len(rows), 9))
         if len(model.pairs) == 0:
@@ -391,9 +410,7 @@ class CollisionModel:
                 len(rows),
                 GRAIN,
             )
-        names = tuple(self.names_of(int(p)) for p in number)
-        points = out[:, :6].reshape(*shape, 2, 3)
-        return Closest(distance.reshape(shape), points, out[:, 6:].reshape(*shape, 3), names)
+        return distance, number, out
 
     def why(self, q: ArrayLike) -> tuple[Touch, ...]:
         """What is nearer than the clearance in one configuration ``q (n,)``, the worst first."""

@@ -304,3 +304,34 @@ def distances(model, q, within, start, stop, distance, pair, out, of_blocks):
             if each:
                 of_blocks[block] = least
         distance[i], pair[i] = best, found
+
+
+@kernel
+def gradients(model, q, pair, points, start, stop, out):
+    """Derivatives ``out (N, n)`` of the distances of `distances`, whose pairs and ``points (N, 9)`` are given.
+
+    ∂d/∂q = nᵀ (J_a(p_a) − J_b(p_b)) with the witness points fixed to their shapes and the normal n from b to a.
+    """
+    links, joints, ints, pairs = model.links, model.joints, model.ints, model.pairs
+    poses = np.zeros((links.shape[0], 12))
+    for i in range(start, stop):
+        move_joints(links, joints, q[i], poses)
+        for j in range(q.shape[1]):
+            out[i, j] = 0.0
+        nx, ny, nz = points[i, 6], points[i, 7], points[i, 8]
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            joint = ints[pairs[pair[i], side], 3]
+            while joint >= 0:
+                T = poses[joint]
+                zx, zy, zz = T[2], T[5], T[8]
+                vx, vy, vz = zx, zy, zz
+                if links[joint, 1] == 0:
+                    x, y, z = (
+                        points[i, 3 * side] - T[9],
+                        points[i, 3 * side + 1] - T[10],
+                        points[i, 3 * side + 2] - T[11],
+                    )
+                    vx, vy, vz = zy * z - zz * y, zz * x - zx * z, zx * y - zy * x
+                out[i, links[joint, 2]] += sign * joints[joint, 12] * (nx * vx + ny * vy + nz * vz)
+                joint = links[joint, 0]
