@@ -18,6 +18,7 @@ from .contacts import ContactTable, Touch
 from .model import Plant, build
 from .physics import Physics
 from .record import Recorder, Recording
+from .stick import carry_along
 
 if TYPE_CHECKING:
     from ..collision import Scene
@@ -177,6 +178,7 @@ class World:
             tau += controller.torque(self)
         self.tau = tau
         self.data.qfrc_applied[self.plant.v_address] = tau
+        carry_along(self.plant, self.data)
         mujoco.mj_step2(self.model, self.data)
         self.table = ContactTable.read(self.model, self.data)
         mujoco.mj_step1(self.model, self.data)
