@@ -10,7 +10,7 @@ import pytest
 
 from apprehend.errors import DescriptionError, InputError, MissingDependencyError, UnknownNameError
 from apprehend.kinematics import Hand, ParallelJaw, Robot
-from apprehend.robots import parse_urdf
+from apprehend.robots import Actuator, parse_urdf
 from tests.kinematics.hands import box, hinged, sliding
 
 
@@ -76,6 +76,14 @@ def test_two_motors_hold_with_the_weaker() -> None:
     assert jaw.max_width == pytest.approx(0.06, abs=1e-5)
     assert jaw.max_force == pytest.approx(30.0, rel=1e-6)
     assert np.allclose(jaw.q_at(0.06), [0.03, -0.03], atol=1e-6)
+
+
+def test_a_motor_on_a_tendon_bounds_the_force() -> None:
+    hand = sliding(effort=0.0)  # zero means not given
+    assert hand.jaw.max_force == math.inf
+    pull = Actuator("pull", {"left": 0.5, "right": -0.5}, -100.0, 40.0)  # right = −left: together 1 N for each newton
+    driven = Hand(Robot(dataclasses.replace(hand.robot.description, actuators=(pull,))))
+    assert driven.jaw.max_force == pytest.approx(50.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("turn", ["0.3 0 0", "0 0.9 0", "0.2 -0.4 1.0", "3.14159 0 0"])

@@ -8,44 +8,20 @@ turn about a hinge, and one jaw may stand still.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from ..arrays import Array, BoolArray
 from ..errors import DescriptionError
-from ..robots.description import JointType
-from ..robots.meshes import link_surface
 from .gap import Grid, extent_along_lines, largest_patch
 from .jaw import ParallelJaw
+from .jaw_measure import measure
+from .jaw_parts import Patch, Surfaces, approach, surfaces_of
 from .robot import Robot
 
-SAMPLES = 129
-"""Samples of the stroke."""
 PAD_TOLERANCE = 1e-3
 """A place belongs to a pad if the gap there is at most this much above the smallest, in m."""
 SLOW = 0.4
 """Surfaces that move slower than this share of the fastest are not pads."""
-MAX_OPENING = np.radians(60.0)
-"""Pads that turn count as facing each other up to this angle between them."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Surfaces:
-    """Triangles of each link of a hand, in link frames; *moving* says which links its joints move."""
-
-    robot: Robot
-    triangles: dict[str, Array]
-    moving: frozenset[str]
-
-    def placed(self, q: Array, links: frozenset[str] | set[str], R: Array) -> Array:
-        """Triangles ``(T, 3, 3)`` of *links* at joints *q*, in axes *R* ``(3, 3)`` (rows) of the hand frame."""
-        parts = [np.empty((0, 3, 3))]
-        for link in links:
-            if link in self.triangles:
-                T = self.robot.fk(q, link)
-                parts.append((self.triangles[link] @ T[:3, :3].T + T[:3, 3]) @ R.T)
-        return np.concatenate(parts)
 
 
 def find_jaw(robot: Robot) -> ParallelJaw:
@@ -57,7 +33,7 @@ def find_jaw(robot: Robot) -> ParallelJaw:
     limits = robot.limits
     if not (np.isfinite(limits.lower) & np.isfinite(limits.upper) & (limits.upper > limits.lower)).all():
         raise DescriptionError(f"hand {robot.name!r}: a jaw needs finite limits on {', '.join(robot.joint_names)}")
-    surfaces = _surfaces(robot)
+    surfaces = surfaces_of(robot)
     candidates = []
     for corner in _corners(robot.n):
         closed = np.where(corner, limits.upper, limits.lower)
@@ -77,25 +53,7 @@ def _corners(n: int) -> list[Array]:
     return [np.array([(k >> i) & 1 for i in range(n)], dtype=bool) for k in range(2**n)]
 
 
-def _surfaces(robot: Robot) -> _Surfaces:
-    description = robot.description
-    moving: set[str] = set()
-    for joint in description.joints:
-        if joint.type is not JointType.FIXED or joint.parent in moving:
-            moving.add(joint.child)
-    triangles = {}
-    for name, link in description.links.items():
-        vertices, faces = link_surface(link)
-        if not len(faces):  # a part without collision geometry is as large as it looks
-            vertices, faces = link_surface(link, visual=True)
-        if len(faces):
-            triangles[name] = vertices[faces]
-    if not triangles.keys() & moving or len(triangles) < 2:
-        raise DescriptionError(f"hand {robot.name!r}: its fingers have no geometry, so that no jaw can be found")
-    return _Surfaces(robot, triangles, frozenset(moving))
-
-
-def _try_direction(surfaces: _Surfaces, opened: Array, closed: Array) -> ParallelJaw | None:
+def _try_direction(surfaces: Surfaces, opened: Array, closed: Array) -> ParallelJaw | None:
     """The jaw that closes from *opened* to *closed*, or None if nothing closes that way."""
     robot = surfaces.robot
     groups = _groups(surfaces, opened, closed)
@@ -120,10 +78,10 @@ def _try_direction(surfaces: _Surfaces, opened: Array, closed: Array) -> Paralle
             break
         R = _axes_with(axis)
         patch = _pads(fast, q_closed, R, front, back)
-    return None if patch is None else _measure(surfaces, opened, q_closed, R, patch)
+    return None if patch is None else measure(surfaces, opened, q_closed, R, patch)
 
 
-def _closing_direction(robot: Robot, patch: _Patch, before: Array, closed: Array) -> Array:
+def _closing_direction(robot: Robot, patch: Patch, before: Array, closed: Array) -> Array:
     """The direction in which pad 1 approaches pad 0 when the jaw is nearly closed."""
     travel = []
     for link, point in zip(patch.links, patch.points, strict=True):
@@ -134,7 +92,7 @@ def _closing_direction(robot: Robot, patch: _Patch, before: Array, closed: Array
     return direction
 
 
-def _groups(surfaces: _Surfaces, opened: Array, closed: Array) -> tuple[Array, frozenset[str], frozenset[str]] | None:
+def _groups(surfaces: Surfaces, opened: Array, closed: Array) -> tuple[Array, frozenset[str], frozenset[str]] | None:
     """The closing direction near *closed* and the links on its positive and its negative side, or None."""
     robot = surfaces.robot
     before = closed + 1e-4 * (opened - closed)
@@ -169,7 +127,7 @@ def _groups(surfaces: _Surfaces, opened: Array, closed: Array) -> tuple[Array, f
     return (axis, front, back) if front and back else None
 
 
-def _fast_parts(surfaces: _Surfaces, opened: Array, closed: Array, axis: Array) -> _Surfaces:
+def _fast_parts(surfaces: Surfaces, opened: Array, closed: Array, axis: Array) -> Surfaces:
     """*surfaces* without what the closing motion hardly moves: the neighbourhood of hinges, where parts overlap."""
     before = closed + 1e-4 * (opened - closed)
     speed = {}
@@ -178,7 +136,7 @@ def _fast_parts(surfaces: _Surfaces, opened: Array, closed: Array, axis: Array) 
         speed[link] = (D[:3], float(D[3]))
     fastest = max(float(np.abs(surfaces.triangles[n] @ D + d).max()) for n, (D, d) in speed.items())
     kept = {n: _beyond(t, *speed[n], SLOW * fastest) if n in speed else t for n, t in surfaces.triangles.items()}
-    return _Surfaces(surfaces.robot, {n: t for n, t in kept.items() if len(t)}, surfaces.moving)
+    return Surfaces(surfaces.robot, {n: t for n, t in kept.items() if len(t)}, surfaces.moving)
 
 
 def _beyond(triangles: Array, D: Array, d: float, limit: float) -> Array:
@@ -203,7 +161,7 @@ def _axes_with(x: Array) -> Array:
 
 
 def _gap_on_lines(
-    surfaces: _Surfaces, q: Array, R: Array, front: frozenset[str], back: frozenset[str], cell: float
+    surfaces: Surfaces, q: Array, R: Array, front: frozenset[str], back: frozenset[str], cell: float
 ) -> tuple[Grid, Array, Array, Array]:
     """The grid, the gap on each line (inf where not both are met), and the two faces that bound it."""
     a, b = surfaces.placed(q, front, R), surfaces.placed(q, back, R)
@@ -221,7 +179,7 @@ def _gap_on_lines(
 
 
 def _first_touch(
-    surfaces: _Surfaces, opened: Array, closed: Array, R: Array, front: frozenset[str], back: frozenset[str]
+    surfaces: Surfaces, opened: Array, closed: Array, R: Array, front: frozenset[str], back: frozenset[str]
 ) -> float:
     """How far from *opened* to *closed* (0 to 1) the jaws can go until they touch; 0 if they never close."""
 
@@ -247,18 +205,7 @@ def _first_touch(
     return low
 
 
-@dataclass(frozen=True, eq=False)
-class _Patch:
-    """The pads when closed, in the axes of the search: centres on both faces, extents, and the links they are on."""
-
-    centre: Array  # (2, 3)
-    low: Array  # (2,)
-    high: Array  # (2,)
-    links: tuple[str, str]
-    points: Array  # (2, 3), the centres in the frames of their links
-
-
-def _pads(surfaces: _Surfaces, q: Array, R: Array, front: frozenset[str], back: frozenset[str]) -> _Patch | None:
+def _pads(surfaces: Surfaces, q: Array, R: Array, front: frozenset[str], back: frozenset[str]) -> Patch | None:
     """Where the gap is smallest; or, where fingers meet at their bases first, the larger faces beyond."""
     lines = _gap_on_lines(surfaces, q, R, front, back, 0.5e-3)
     grid, gap = lines[0], lines[1]
@@ -267,7 +214,7 @@ def _pads(surfaces: _Surfaces, q: Array, R: Array, front: frozenset[str], back: 
     mask = largest_patch(gap <= gap.min() + PAD_TOLERANCE)
     patch = _patch(surfaces, q, R, (front, back), lines, mask)
     y, z = grid.centres()
-    distal = np.tensordot(R[1:] @ _approach(surfaces, q, R, patch), np.stack([y, z]), axes=1)
+    distal = np.tensordot(R[1:] @ approach(surfaces, q, R, patch), np.stack([y, z]), axes=1)
     beyond = np.isfinite(gap) & (distal > distal[mask].max())
     if beyond.any():
         further = largest_patch(beyond & (gap <= gap[beyond].min() + PAD_TOLERANCE))
@@ -277,13 +224,13 @@ def _pads(surfaces: _Surfaces, q: Array, R: Array, front: frozenset[str], back: 
 
 
 def _patch(
-    surfaces: _Surfaces,
+    surfaces: Surfaces,
     q: Array,
     R: Array,
     groups: tuple[frozenset[str], frozenset[str]],
     lines: tuple[Grid, Array, Array, Array],
     mask: BoolArray,
-) -> _Patch:
+) -> Patch:
     """The pads on the *lines* chosen by *mask*: middle, extents, and the links that most lines end on."""
     grid, _, *faces = lines
     y, z = grid.centres()
@@ -301,103 +248,4 @@ def _patch(
         centres.append([float(face.ravel()[nearest]), *middle])
     poses = [surfaces.robot.fk(q, link) for link in links]
     points = [T[:3, :3].T @ (R.T @ c - T[:3, 3]) for T, c in zip(poses, centres, strict=True)]
-    return _Patch(np.array(centres), low, high, (links[0], links[1]), np.array(points))
-
-
-def _measure(surfaces: _Surfaces, opened: Array, closed: Array, R: Array, patch: _Patch) -> ParallelJaw | None:
-    """Follow the pads through the stroke and measure width, force, depth."""
-    robot = surfaces.robot
-    path = closed + np.linspace(0.0, 1.0, SAMPLES)[:, None] * (opened - closed)
-    poses = [robot.fk(path, link) for link in patch.links]
-    p0, p1 = [T[:, :3, :3] @ p + T[:, :3, 3] for T, p in zip(poses, patch.points, strict=True)]
-    widths = np.linalg.norm(p0 - p1, axis=1)
-    facing = np.einsum("kij,kij->k", *(T[:, :3, :3] @ T[0, :3, :3].T for T in poses))  # trace of the relative rotation
-    good = (np.diff(widths) > 0) & (np.arccos(np.clip(0.5 * (facing[1:] - 1.0), -1.0, 1.0)) <= MAX_OPENING)
-    stop = len(widths) if good.all() else int(np.argmin(good)) + 1
-    if stop < 3:
-        return None
-    end = path[stop - 1]
-    path = closed + np.linspace(0.0, 1.0, SAMPLES)[:, None] * (end - closed)
-    z = _approach(surfaces, closed, R, patch)
-    jaw = ParallelJaw(
-        robot,
-        max_width=float(widths[stop - 1]),
-        min_width=float(widths[0]),
-        pad_links=patch.links,
-        pad_points=patch.points,
-        pad_size=(0.0, 0.0),
-        finger_depth=0.0,
-        tip_length=0.0,
-        max_force=0.0,
-        _path=path,
-        _widths=np.empty(0),
-        _axes=np.stack([R[0], z]),
-    )
-    y = np.cross(z, R[0])
-    size = [float(np.abs(R[1:] @ axis) @ (patch.high - patch.low)) for axis in (y, z)]
-    slopes = np.abs(np.stack([_width_slope(jaw, q) for q in path]))
-    forces = np.divide(robot.limits.effort, slopes, out=np.full_like(slopes, np.inf), where=slopes > 1e-9)
-    jaw = replace(jaw, pad_size=(size[0], size[1]), max_force=float(forces.min()), _widths=jaw.width_of(path))
-    depth, tip = _depth(surfaces, jaw)
-    return replace(jaw, finger_depth=depth, tip_length=tip)
-
-
-def _width_slope(jaw: ParallelJaw, q: Array) -> Array:
-    """∂width/∂q ``(n,)`` by central differences."""
-    h = 1e-6 * np.maximum(np.abs(jaw._path[-1] - jaw._path[0]), 1e-3)
-    plus, minus = q + np.diag(h), q - np.diag(h)
-    p0, p1 = jaw.pads(np.concatenate([plus, minus]))
-    axis = jaw._axes[0]
-    apart = (p0 - p1) @ axis
-    n = len(q)
-    slope: Array = (apart[:n] - apart[n:]) / (2 * h)
-    return slope
-
-
-def _approach(surfaces: _Surfaces, closed: Array, R: Array, patch: _Patch) -> Array:
-    """The direction away from the palm, perpendicular to the closing direction.
-
-    From the middle of what does not move to the pads; turned to the nearest axis of the hand's or a pad's frame
-    within 20 degrees, since the middle of a palm is rarely exactly behind the pads.
-    """
-    robot = surfaces.robot
-    static = surfaces.placed(closed, frozenset(surfaces.triangles.keys() - surfaces.moving), np.eye(3))
-    if not len(static):
-        static = np.zeros((1, 3, 3))
-    box = static.reshape(-1, 3)
-    palm = 0.5 * (box.min(axis=0) + box.max(axis=0))
-    x = R[0]
-    tcp = R.T @ patch.centre.mean(axis=0)
-    direction = tcp - palm
-    direction = direction - x * (x @ direction)
-    if np.linalg.norm(direction) < 1e-6:
-        direction = R[2]
-    direction /= np.linalg.norm(direction)
-    frames = [np.eye(3), *(robot.fk(closed, link)[:3, :3] for link in patch.links)]
-    axes = np.concatenate([f.T for f in frames])
-    axes = np.concatenate([axes, -axes])
-    axes = axes - np.outer(axes @ x, x)
-    lengths = np.linalg.norm(axes, axis=1)
-    axes = axes[lengths > 0.9] / lengths[lengths > 0.9, None]
-    cosines = axes @ direction
-    if len(axes) and cosines.max() > np.cos(np.radians(20)):
-        direction = axes[int(np.argmax(cosines))]
-    return np.asarray(direction, dtype=np.float64)
-
-
-def _depth(surfaces: _Surfaces, jaw: ParallelJaw) -> tuple[float, float]:
-    """Free depth from the tcp back to the palm, and the reach of the fingers beyond it, at full width."""
-    q = jaw._path[-1]
-    T = jaw.tcp_at(jaw.max_width)
-    R = np.stack([T[:3, 2], T[:3, 0], T[:3, 1]])  # lines run along z
-    origin = R @ T[:3, 3]
-    everything = surfaces.placed(q, frozenset(surfaces.triangles), R) - origin
-    half = np.array([max(0.35 * jaw.max_width, 1e-3), max(0.5 * jaw.pad_size[0], 1e-3)])
-    behind = everything[(everything[:, :, 0].min(axis=1) < 0.0)]
-    grid = Grid.over(-half, half, 1e-3)
-    _, top = extent_along_lines(behind, grid)
-    top = top[np.isfinite(top)]
-    fingers = surfaces.placed(q, set(jaw.pad_links), R) - origin
-    tip = float(fingers[:, :, 0].max())
-    low = -float(everything[:, :, 0].min())
-    return (max(0.0, -float(top.max())) if len(top) else low), tip
+    return Patch(np.array(centres), low, high, (links[0], links[1]), np.array(points))
