@@ -100,6 +100,8 @@ def _film(studio: Studio) -> str:
             continue
         caption = f"<b>{html.escape(band.label)}</b>, until {band.stop:.2f} s"
         shots.append(_figure(studio.shot(record.at(band.stop), FRAME), caption))
+    if len(shots) < 2:
+        return ""  # the picture above shows it
     return f'<h2>What happened</h2><div class="film">{"".join(shots)}</div>'
 
 
@@ -138,10 +140,9 @@ def _tiles(data: Mapping[str, Any], record: Record | None) -> str:
         ("time to plan and simulate", sum(s["duration"] for s in steps), 1.0, "s", 1),
     ]
     if record is not None:
-        tiles += [
-            ("length of the motion", float(record.time[-1]), 1.0, "s", 1),
-            ("largest net force of the hand", float(record.force.max()), 1.0, "N", 1),
-        ]
+        tiles.append(("length of the motion", float(record.time[-1]), 1.0, "s", 1))
+        if record.force.max() > 0.0:
+            tiles.append(("largest net force of the hand", float(record.force.max()), 1.0, "N", 1))
     plan = next((s for s in steps if s["name"] == "plan"), None)
     if plan and plan["outputs"].get("width") is not None:
         tiles.append(("width of the grasp", plan["outputs"]["width"], 1e3, "mm", 1))

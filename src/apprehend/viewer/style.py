@@ -42,7 +42,7 @@ dl { display:grid; grid-template-columns:max-content 1fr; gap:1px 10px; margin:0
 dt { color:var(--soft); } dd { margin:0; font-variant-numeric:tabular-nums; overflow-wrap:anywhere; }
 details summary { cursor:pointer; color:var(--soft); font-size:13px; } details dl { margin-top:6px; }
 .charts, .joints { display:grid; gap:14px; } .joints { grid-template-columns:repeat(auto-fill,minmax(300px,1fr)); }
-td.margins { min-width:200px; } td.margins dd { white-space:nowrap; }
+td.margins { min-width:200px; } td:nth-child(2) { min-width:150px; } td.margins dd { white-space:nowrap; }
 .card header { display:flex; justify-content:space-between; gap:10px; align-items:baseline; flex-wrap:wrap; }
 .card header.small { display:block; } .card header.small .readout { display:block; }
 .pair { display:grid; grid-template-columns:repeat(auto-fit,minmax(320px,1fr)); gap:16px; }

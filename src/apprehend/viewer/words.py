@@ -8,9 +8,9 @@ from typing import Any
 
 MILLIMETRES = {
     "width", "opening", "slip", "moved", "pushed", "raised", "com_distance", "position_error", "width_error", "torsion",
-    "clearance", "distance", "standoff", "depth",
+    "clearance", "distance", "standoff", "depth", "error",
 }  # fmt: skip
-DEGREES = {"angle_error", "tilt", "angle"}
+DEGREES = {"angle_error", "tilt", "angle", "turn"}
 NEWTONS = {"force", "forces", "needed", "required_force"}
 SECONDS = {"duration", "time", "simulated"}
 KILOGRAMS = {"mass"}
