@@ -11,7 +11,7 @@ from ..arrays import Array, BoolArray, IntArray
 from ..kernels import hull
 from ..parallel import over_ranges
 
-ROOMS = (1024, 8192, 65536, 262144)
+ROOMS = (2048, 16384, 131072, 524288)
 """Facets that a growing polytope may have; the next size is tried when one is full."""
 
 

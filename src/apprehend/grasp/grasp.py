@@ -188,14 +188,16 @@ class Grasp:
             raise InputError(f"m is {m}; a polyhedral cone needs at least 3 edges")
         base, spread, box = self.generators
         turn = 2.0 * np.pi * np.arange(m) / m
+        rings = base[:, None] + np.cos(turn)[:, None] * spread[:, None, 0] + np.sin(turn)[:, None] * spread[:, None, 1]
+        if all(c.size == 3 for c in self.contacts):
+            return rings.reshape(-1, self.wrench_size)
         rows = []
-        for contact, b, s, is_box in zip(self.contacts, base, spread, box, strict=True):
+        for contact, b, s, is_box, ring in zip(self.contacts, base, spread, box, rings, strict=True):
             if contact.size == 1:
                 rows.append(b[None])
             elif contact.dimension == 2:
                 rows.append(np.stack([b + s[0], b - s[0]]))
             else:
-                ring = b + np.cos(turn)[:, None] * s[0] + np.sin(turn)[:, None] * s[1]
                 if is_box:
                     rows += [ring + s[2], ring - s[2]]
                 elif contact.size == 4:

@@ -53,9 +53,9 @@ def plan(
     The quality is the product of four parts, each in [0, 1], with exponents `jaw_search.WEIGHTS`: *cone*, the
     cone margin over arctan µ; *force*, ``1 − required / max_force``; *centre*, ``1 / (1 + (2 d / r)²)`` with d the
     distance of the centre of mass from the closing line and r the body's radius; *coverage*, the square root of the
-    share of the smaller patch in its pad. ``margins`` holds ``epsilon`` (certified lower bound, L1, exact cones, torques
-    over the body's radius), ``cone`` (rad), ``force`` (N), ``com_distance`` (m), ``coverage``, ``torsion`` (γ in m) and
-    the quality's four parts.
+    share of the smaller patch in its pad. ``margins`` holds ``epsilon`` (certified lower bound, L1, exact cones,
+    torques over the body's radius), ``cone`` (rad), ``force`` (N), ``com_distance`` (m), ``coverage``, ``torsion``
+    (γ in m) and the quality's four parts.
 
     γ of a contact is µ times the mean distance of its patch from the patch's middle (even pressure), at least the
     body's `torsional_friction`. The answer is the same for the same state of *rng*. Raises `InputError` for arguments
