@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import typer
 
-from . import grasp, pick, view
+from . import grasp, pick, trajectory, view
 
 app = typer.Typer(name="apprehend", add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
 app.command("pick", help="Pick an object and place it: plan, simulate, judge.")(pick.command)
 app.command("view", help="Replay an episode in the browser, or look at a body or a robot.")(view.command)
 app.add_typer(grasp.app, name="grasp")
 app.command("forces", help="Optimal contact forces against a wrench.")(grasp.forces)
+app.command("trajectory", help="Time a path through waypoints within proven limits.")(trajectory.command)
 
 
 @app.callback()

@@ -41,6 +41,7 @@ def command(
     """Exit code 0: the object stands at its goal; 1: it does not (the verdict says why); 2: the input is wrong."""
     from ..process import pick_and_place
     from .progress import Checklist, silence
+    from .warm import warm_up
 
     start = time.perf_counter()
     with silence() if as_json else Checklist(console) as observer:
@@ -50,6 +51,7 @@ def command(
             from ..process import shuffled
 
             scene = shuffled(scene, seed)
+        warm_up(observer)
         episode = pick_and_place(scene, seed=seed, observer=observer)
     wall = time.perf_counter() - start
     saved = save(episode, out) if out is not None else None

@@ -1,0 +1,103 @@
+"""``apprehend trajectory``: waypoints from a file, a motion within proven limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .console import console, print_json
+
+
+def command(
+    waypoints: Annotated[
+        Path, typer.Argument(help="joint values, one waypoint per row: .csv, or .json (list of lists)")
+    ],
+    robot: Annotated[str, typer.Option(help="robot whose limits hold: a catalogue name or a file")] = "",
+    velocity: Annotated[
+        float | None, typer.Option(help="velocity limit of every joint, instead of the robot's")
+    ] = None,
+    acceleration: Annotated[float | None, typer.Option(help="acceleration limit of every joint")] = None,
+    jerk: Annotated[float | None, typer.Option(help="jerk limit of every joint: makes the motion jerk-limited")] = None,
+    straight: Annotated[bool, typer.Option(help="straight segments instead of a spline through the waypoints")] = False,
+    deviation: Annotated[float, typer.Option(help="how far straight segments may be left to round corners")] = 0.0,
+    torque: Annotated[bool, typer.Option(help="keep the robot's torque limits too (full dynamics)")] = False,
+    out: Annotated[Path | None, typer.Option(help="write the motion: .json (exact), .csv, or .ros.json")] = None,
+    dt: Annotated[float, typer.Option(help="seconds between samples of .csv and .ros.json")] = 0.01,
+    picture: Annotated[
+        Path | None, typer.Option(help="draw position to jerk with the limits (.png, .svg, .pdf)")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
+) -> int:
+    """Time a path. Exit code 0: a motion with proven limits; 1: there is none, and why; 2: wrong input."""
+    from .. import trajectory as tj
+    from ..errors import InputError, UnsuccessfulError
+    from ..kinematics import Robot
+
+    points = tj.read_waypoints(waypoints)
+    arm = Robot.load(robot) if robot else None
+    names = arm.joint_names if arm is not None else None
+    if arm is not None and points.shape[1] != arm.n:
+        raise InputError(f"{waypoints} has {points.shape[1]} columns; robot {arm.name!r} has {arm.n} joints: {names}")
+    limits = tj.Limits(
+        velocity=velocity if velocity is not None else arm.limits.velocity if arm is not None else None,
+        acceleration=acceleration if acceleration is not None else arm.limits.acceleration if arm is not None else None,
+        jerk=jerk,
+    )
+    if torque and arm is None:
+        raise InputError("--torque needs --robot: the torques follow from its dynamics")
+    try:
+        if straight and deviation == 0.0:
+            if torque or jerk is not None:
+                raise InputError("straight segments with stops take no --torque or --jerk; give a --deviation > 0")
+            motion = tj.follow(points, limits)
+        else:
+            path = tj.rounded(points, deviation) if straight else tj.Spline(points)
+            if jerk is not None:
+                if torque:
+                    raise InputError("--jerk and --torque together are not supported; choose one")
+                motion = tj.jerk_limited(path, limits, least=8)
+            else:
+                constraints = [tj.TorqueLimits(arm)] if torque and arm is not None else []
+                motion = tj.time_optimal(path, limits, constraints=constraints, least=8).require_success().motion
+    except UnsuccessfulError as error:
+        if as_json:
+            print_json({"success": False, "why": str(error)})
+        else:
+            console.print(f"no motion: {error}")
+        return 1
+    report = motion.check(limits)
+    if out is not None:
+        _write(motion, out, dt, names)
+    if picture is not None:
+        tj.plot(motion, limits, names=names, relative=True).savefig(picture)
+    facts: dict[str, Any] = {
+        "success": report.success, "duration": motion.duration, "pieces": int(motion.breaks.size - 1),
+        "length": tj.arc_length(motion, tolerance=1e-9), "limit": report.limit, "coordinate": report.coordinate,
+        "time": report.time, "value": report.value, "bound": report.bound, "violation": report.violation,
+    }  # fmt: skip
+    if as_json:
+        print_json(facts)
+    else:
+        joint = names[report.coordinate] if names is not None else f"q{report.coordinate + 1}"
+        console.print(f"{points.shape[0]} waypoints, {points.shape[1]} joints: {motion.duration:.4f} s")
+        console.print(f"limits proven at all times; tightest: {report.limit} of {joint}, {report.value:.4g} of "
+                      f"{report.bound:.4g} at t = {report.time:.4f} s")  # fmt: skip
+        if out is not None:
+            console.print(f"written: {out}")
+    return 0 if report.success else 1
+
+
+def _write(motion: Any, out: Path, dt: float, names: Any) -> None:
+    from .. import trajectory as tj
+    from ..errors import InputError
+
+    if out.name.endswith(".ros.json"):
+        tj.to_ros(motion, out, dt=dt, names=names)
+    elif out.suffix == ".json":
+        tj.to_json(motion, out, names=names)
+    elif out.suffix == ".csv":
+        tj.to_csv(motion, out, dt=dt, names=names)
+    else:
+        raise InputError(f"--out is {out}; expected a name that ends in .json, .ros.json or .csv")
