@@ -189,6 +189,10 @@ def test_allowed_pairs_of_drake_groups() -> None:
         (robot(link("a", inertial(1, -1, 1, 1))), "has a negative principal moment, -1 kg m²"),
         (robot(link("a", inertial(0, 1, 1, 1))), "an inertia of up to 1 kg m² with zero mass"),
         (
+            robot(link("a"), link("b", inertial(0, 0, 0, 0)), joint("j", "a", "b")),
+            "joint 'j' moves links without any mass; kept massless",
+        ),
+        (
             robot(link("a", inertial()), link("b"), joint("j", "a", "b")),
             "joint 'j' moves links without any mass; kept massless: forward dynamics is singular",
         ),

@@ -190,7 +190,7 @@ class _Reader:
     def _massless(self, joints: tuple[Joint, ...]) -> None:
         """Report moving parts without any mass from there on: they are kept, but dynamics is singular for them."""
         heavy = {n for n, link in self.links.items() if link.inertial is not None and link.inertial.mass > 0.0}
-        if not heavy:
+        if not any(link.inertial for link in self.links.values()):
             return  # a purely kinematic description
         for joint in reversed(joints):
             if joint.child in heavy:
