@@ -52,19 +52,19 @@ def test_torques_stay_within_limits_at_all_times(robot: ap.Robot, seed: int) -> 
 
 def test_torques_recomputed_by_pinocchio() -> None:
     pin = pytest.importorskip("pinocchio")
-    example = pytest.importorskip("example_robot_data")
     robot = ap.Robot.load("ur5")
-    peer = example.load("ur5")
-    assert peer.model.nq == robot.n
+    model = pin.buildModelFromUrdf(str(robot.description.source))
+    data = model.createData()
+    assert model.nq == robot.n
     path = spline(robot, 5)
     effort = np.array([60.0, 120.0, 60.0, 12.0, 12.0, 12.0])
     timing = tj.time_optimal(path, limits(robot), constraints=[tj.TorqueLimits(robot, effort)], grid=150)
     motion = timing.require_success().motion
-    order = [peer.model.joints[peer.model.getJointId(name)].idx_q for name in robot.joint_names]
+    order = [model.joints[model.getJointId(name)].idx_q for name in robot.joint_names]
     for t in np.linspace(0.0, motion.duration, 500):
         q, v, a = (np.empty(robot.n) for _ in range(3))
         q[order], v[order], a[order] = motion(t), motion(t, 1), motion(t, 2)
-        torque = pin.rnea(peer.model, peer.data, q, v, a)[order]
+        torque = pin.rnea(model, data, q, v, a)[order]
         assert (np.abs(torque) <= effort * (1 + 1e-6)).all()
 
 

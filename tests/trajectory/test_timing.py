@@ -148,6 +148,34 @@ def test_refining_the_grid_never_breaks_limits_and_converges() -> None:
     assert own.duration == pytest.approx(durations[1], rel=1e-2)
 
 
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 10**6))
+def test_any_path_any_scale_any_grid(seed: int) -> None:
+    """Splines, B-splines, rounded and bare polylines over many magnitudes: solved, proven, and at the goal."""
+    rng = np.random.default_rng(seed)
+    n, m = int(rng.integers(1, 9)), int(rng.integers(6, 12))
+    points = rng.normal(size=(m, n)) * 10 ** rng.uniform(-3, 2)
+    path = [
+        lambda: tj.Spline(points, exponent=0.5),
+        lambda: tj.BSpline.through(points, 5),
+        lambda: tj.rounded(points, 10 ** rng.uniform(-4, 0)),
+        lambda: tj.polyline(points),
+    ][int(rng.integers(4))]()
+    limits = tj.Limits(velocity=10 ** rng.uniform(-2, 2, n), acceleration=10 ** rng.uniform(-2, 2, n))
+    timing = tj.time_optimal(path, limits, grid=int(rng.choice([1, 7, 40, 300])))
+    timing.require_success()
+    assert timing.report.success, timing.report.explain()
+    np.testing.assert_allclose(timing.motion.end, points[-1], atol=1e-7 * (1.0 + np.abs(points).max()))
+
+
+def test_a_grid_too_coarse_to_move_is_named() -> None:
+    path = tj.polyline([[0.0], [1.0]])
+    timing = tj.time_optimal(path, tj.Limits(acceleration=1.0), grid=[0.0, 1.0])
+    assert timing.status is tj.TimingStatus.STALLED
+    assert "give a finer grid" in timing.explain()
+    assert tj.time_optimal(path, tj.Limits(acceleration=1.0), grid=1).success
+
+
 def test_toppra_is_not_faster_at_the_same_grid() -> None:
     toppra = pytest.importorskip("toppra")
     toppra.setup_logging("ERROR")

@@ -3,7 +3,7 @@
 from .blends import blend, blend_through
 from .constraints import CartesianAcceleration, CartesianSpeed, Constraint, PowerLimits, Rows, TorqueLimits
 from .deviation import LineResult, LineStatus, along, arc, screw_line, straight_line, tool_frame
-from .export import joint_trajectory, read_json, to_csv, to_json
+from .export import joint_trajectory, read_json, read_waypoints, to_csv, to_json, to_ros
 from .follow import follow, rounded, smoothed, through_samples
 from .geometry import NaturalPath, arc_length, bending_energy, curvature, tangent, torsion
 from .jerk import jerk_limited, state_to_state
@@ -77,6 +77,7 @@ __all__ = [
     "polyline",
     "quintic",
     "read_json",
+    "read_waypoints",
     "rounded",
     "screw_line",
     "septic",
@@ -91,6 +92,7 @@ __all__ = [
     "time_optimal_many",
     "to_csv",
     "to_json",
+    "to_ros",
     "tool_frame",
     "torsion",
     "via_velocities",

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import InputError
 from .motion import Trajectory
+from .path import as_waypoints
 
 _FORMAT = "apprehend trajectory 1"
 
@@ -68,6 +70,40 @@ def joint_trajectory(motion: Trajectory, *, dt: float = 0.02, names: Sequence[st
         })  # fmt: skip
     header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     return {"header": header, "joint_names": list(_names(motion, names)), "points": points}
+
+
+def to_ros(motion: Trajectory, path: str | Path, *, dt: float = 0.02, names: Sequence[str] | None = None) -> Path:
+    """`joint_trajectory` as a JSON file."""
+    return _write(path, json.dumps(joint_trajectory(motion, dt=dt, names=names)) + "\n")
+
+
+def read_waypoints(path: str | Path) -> Array:
+    """Waypoints ``(M, n)`` from a ``.csv`` file (one row each, a header is skipped) or a ``.json`` list of lists."""
+    file = Path(path)
+    try:
+        text = file.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read: {error}") from error
+    if file.suffix == ".json":
+        try:
+            rows = json.loads(text)
+        except json.JSONDecodeError as error:
+            raise InputError(f"{path}: not JSON: {error}") from error
+        return as_waypoints(rows, f"the list in {file.name}")
+    table = []
+    for number, line in enumerate(text.splitlines(), 1):
+        cells = line.replace(";", ",").split(",")
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        try:
+            table.append([float(c) for c in cells])
+        except ValueError as error:
+            if not table and number == 1:
+                continue  # a header
+            raise InputError(f"{path}:{number}: {error}; expected numbers separated by commas") from error
+        if len(table[-1]) != len(table[0]):
+            raise InputError(f"{path}:{number}: {len(table[-1])} values; the rows before have {len(table[0])}")
+    return as_waypoints(table, f"the rows of {file.name}")
 
 
 def _names(motion: Trajectory, names: Sequence[str] | None) -> tuple[str, ...]:

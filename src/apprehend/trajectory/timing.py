@@ -14,6 +14,7 @@ from ..arrays import Array, as_array
 from ..errors import InputError
 from ..kernels import path as path_kernels
 from ..kernels import timing as kernels
+from ..kernels import timing_rows as rows_of
 from ..result import Result, Status
 from .constraints import Constraint, PowerLimits
 from .limits import LimitReport, Limits
@@ -123,14 +124,22 @@ def time_optimal(
             raise InputError(f"{name} is {speed}; expected ṡ ≥ 0 along the path")
     if not constraints and not np.isfinite(alim).all():
         _refuse_unbounded(curve, alim)
-    problem = _Problem(curve, limits, make_grid(curve, grid, least), vlim * (1.0 - MARGIN), alim * (1.0 - MARGIN),
-                       float(start_speed), float(end_speed))  # fmt: skip
-    if not constraints:
-        return problem.solve(None)
-    power = [c for c in constraints if isinstance(c, PowerLimits)]
-    found = sample(curve, problem.grid, constraints)
+    while True:
+        problem = _Problem(
+            curve, limits, make_grid(curve, grid, least), vlim * (1.0 - MARGIN), alim * (1.0 - MARGIN),
+            float(start_speed), float(end_speed),
+        )  # fmt: skip
+        timing = problem.solve(None) if not constraints else _constrained(problem, constraints)
+        # between two rests it takes at least two intervals: a coarse grid is refined
+        if timing.status is not TimingStatus.STALLED or not isinstance(grid, (int, np.integer)) or least >= 64:
+            return timing
+        least = 2 * least
+
+
+def _constrained(problem: _Problem, constraints: Sequence[Constraint]) -> Timing:
+    found = sample(problem.path, problem.grid, constraints)
     timing = _with_margins(problem, found, power_of=None)
-    if power and timing.success:
+    if timing.success and any(isinstance(c, PowerLimits) for c in constraints):
         timing = _within_power(problem, found, timing)
     return timing
 
@@ -149,8 +158,8 @@ class _Problem:
         count = self.grid.size - 1
         x, alpha, beta = np.zeros((3, count + 1))
         values, bounds = (NO_SAMPLES, NO_BOUNDS) if sampled is None else (sampled.values, sampled.bounds)
-        rows = 3 * kernels.row_count(self.path.degree, self.path.n, values.shape[2]) + 2
-        scratch = np.empty((-(-count // kernels.WIDE), rows * kernels.WIDE))
+        rows = 3 * rows_of.row_count(self.path.degree, self.path.n, values.shape[2]) + 2
+        scratch = np.empty((-(-count // rows_of.WIDE), rows * rows_of.WIDE))
         status, stage = kernels.solve_into(
             self.path.breaks, self.path.coefficients, self.grid, self.vlim, self.alim, values, bounds,
             binomials(2 * self.path.degree), self.start_speed**2, self.end_speed**2, scratch,
@@ -175,6 +184,8 @@ class _Problem:
                 f"start_speed is {self.start_speed:.6g}; expected at least {np.sqrt(max(alpha[0], 0.0)):.6g} and at "
                 f"most {np.sqrt(max(beta[0], 0.0)):.6g}"
             )
+        elif status == kernels.STALLED:
+            reason = "the speed is zero at both ends of a grid interval; give a finer grid there"
         else:
             reason = conflict(self.path, self.grid, stage, self.vlim, self.alim, sampled, float(beta[stage + 1]))
             if status == kernels.END:
@@ -233,13 +244,13 @@ def conflict(
     values, bounds = (NO_SAMPLES, NO_BOUNDS) if sampled is None else (
         sampled.values[stage : stage + 1], sampled.bounds[stage : stage + 1]
     )  # fmt: skip
-    rows = int(kernels.row_count(path.degree, path.n, values.shape[2]))
-    table = np.empty((1, (3 * rows + 2) * kernels.WIDE))
-    kernels.rows_along(
+    rows = int(rows_of.row_count(path.degree, path.n, values.shape[2]))
+    table = np.empty((1, (3 * rows + 2) * rows_of.WIDE))
+    rows_of.rows_along(
         path.breaks, path.coefficients, grid[stage : stage + 2], vlim, alim, values, bounds,
         binomials(2 * path.degree), table,
     )  # fmt: skip
-    _, low, high = table[0].reshape(-1, kernels.WIDE)[: 3 * rows, 0].reshape(rows, 3).T
+    _, low, high = table[0].reshape(-1, rows_of.WIDE)[: 3 * rows, 0].reshape(rows, 3).T
     if sampled is not None:
         still = sampled.values[stage, :, :, 2]
         excess = np.maximum(still - sampled.bounds[stage, :, 1], sampled.bounds[stage, :, 0] - still).max(axis=0)
