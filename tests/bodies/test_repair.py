@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from apprehend import Body
 from apprehend.bodies import shapes, topology
+from apprehend.bodies.body import _enclosed
 from apprehend.bodies.convex import ConvexParts
 from apprehend.bodies.mass import solid
-from apprehend.bodies.repair import mend
+from apprehend.bodies.repair import Mended, mend
 from apprehend.errors import MeshError
 
 BOX = shapes.box([0.1, 0.06, 0.04])
@@ -201,6 +202,16 @@ def test_a_moebius_band_has_no_inside(tmp_path: Path, monkeypatch: pytest.Monkey
     assert 0.0 < body.volume < np.pi * 0.065**2 * 0.03
     assert np.linalg.norm(body.com) < 0.02
     assert body.convex_error < 0.01
+
+
+def test_a_surface_that_winds_twice_is_weighed_by_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two layers, both facing outwards, are closed, but count their inside twice: more than the hull holds."""
+    monkeypatch.setenv("APPREHEND_CACHE", str(tmp_path))
+    layers = two(BOX, (BOX[0] * 0.99, BOX[1]), (0, 0, 0))
+    region, mesh, sound = _enclosed(Mended(*layers), "box")
+    assert not sound
+    assert "closed surface encloses 473 cm³ of a hull of 240 cm³" in mesh.repairs[-1]
+    assert region.volume == pytest.approx(VOLUME, rel=0.15)  # the pieces cover it, a little generously
 
 
 def test_winding_and_closure_agree_with_trimesh() -> None:

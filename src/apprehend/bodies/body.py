@@ -55,7 +55,7 @@ class Body:
     torsional_friction: float = 0.005
     """Radius γ in m of the soft-finger model: the largest torsional moment is γ times the normal force."""
     watertight: bool = True
-    """Whether the surface is closed, after repair."""
+    """Whether the surface, after repair, is closed and encloses the body."""
     repairs: tuple[str, ...] = ()
     """What had to be done to the mesh to make it usable, in words; empty if nothing."""
     mass_source: str = "given"
@@ -126,7 +126,7 @@ class Body:
                 raise InputError(f"{where}: {label} is {value!r}; expected a finite number, zero or more")
         kilograms, per_volume, mass_source = _mass_arguments(mass, density, where)
         mesh = mend(points, triangles)
-        region, mesh = _enclosed(mesh, where)
+        region, mesh, sound = _enclosed(mesh, where)
         if per_volume is not None:
             kilograms = per_volume * region.volume
         centre = region.centroid if com is None else as_shaped(com, f"{where}: com", 3)
@@ -144,7 +144,7 @@ class Body:
             volume=region.volume,
             friction=float(friction),
             torsional_friction=float(torsional_friction),
-            watertight=mesh.closed,
+            watertight=sound,
             repairs=mesh.repairs,
             mass_source=mass_source,
             source=source,
@@ -327,8 +327,11 @@ def _mass_arguments(mass: float | None, density: float | None, where: str) -> tu
     return 0.0, float(density or ASSUMED_DENSITY), "density" if density is not None else "assumed"
 
 
-def _enclosed(mesh: Mended, where: str) -> tuple[Solid, Mended]:
-    """The region that the mesh encloses; for an open mesh the union of its convex pieces, and a note that says so."""
+def _enclosed(mesh: Mended, where: str) -> tuple[Solid, Mended, bool]:
+    """The region that the mesh encloses, the mesh, and whether its own surface is that region's.
+
+    For an open mesh, or one that winds about itself, it is the union of its convex pieces, and a note says so.
+    """
     if mesh.closed:
         region = solid(mesh.vertices, mesh.faces)
         from scipy.spatial import ConvexHull
@@ -336,7 +339,7 @@ def _enclosed(mesh: Mended, where: str) -> tuple[Solid, Mended]:
         hull = float(ConvexHull(mesh.vertices).volume)
         sound = 1e-6 * hull < region.volume <= hull * (1.0 + 1e-6)
         if sound and np.linalg.eigvalsh(region.moments)[0] > 0.0:
-            return region, mesh
+            return region, mesh, True
         trouble = f"closed surface encloses {region.volume * 1e6:.3g} cm³ of a hull of {hull * 1e6:.3g} cm³"
     elif len(mesh.faces):
         trouble = "surface is still open"
@@ -350,7 +353,7 @@ def _enclosed(mesh: Mended, where: str) -> tuple[Solid, Mended]:
             f"{'; '.join(mesh.repairs) or 'no repair applied'}. Close it in a mesh tool, or give the sheet a thickness"
         )
     note = f"the {trouble}: mass properties are those of {len(parts.pieces)} convex pieces that cover it"
-    return region, mesh.then(mesh.vertices, mesh.faces, note)
+    return region, mesh.then(mesh.vertices, mesh.faces, note), False
 
 
 def _within_hull(vertices: Array, point: Array) -> bool:
