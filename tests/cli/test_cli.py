@@ -29,6 +29,38 @@ def test_help_lists_the_commands() -> None:
     assert "view" in result.stdout
 
 
+def test_robots_lists_the_catalogue_and_describes_one() -> None:
+    names = {entry["name"] for entry in json.loads(run("robots", "--json").stdout)}
+    assert {"ur5e", "robotiq_2f_85", "panda"} <= names
+    told = run("robots", "ur5e", "--frame", "tool0").stdout
+    assert "shoulder_pan_joint: revolute" in told
+    assert "DH table to tool0 (standard" in told
+
+
+def test_forward_and_inverse_kinematics_agree() -> None:
+    q = "0.3,-1.2,1.4,-1.0,-1.5,0.2"
+    T = json.loads(run("fk", "ur5e", "tool0", "--q", q, "--json").stdout)["tool0"]
+    xyz = ",".join(repr(T[i][3]) for i in range(3))
+    rpy = run("fk", "ur5e", "tool0", "--q", q).stdout.splitlines()[1].split()[4:]
+    result = run("ik", "ur5e", "tool0", "--xyz", xyz, "--rpy", ",".join(rpy), "--n", "20", "--json")
+    assert result.returncode == 0
+    answers = json.loads(result.stdout)["q"]
+    wanted = [float(v) for v in q.split(",")]
+    assert min(max(abs(a - b) for a, b in zip(answer, wanted, strict=True)) for answer in answers) < 1e-4
+
+
+def test_the_jacobian_has_full_rank_away_from_singularities() -> None:
+    J = json.loads(run("jacobian", "ur5e", "tool0", "--json").stdout)
+    assert len(J["jacobian"]) == 6
+    assert min(J["singular_values"]) > 0.1
+
+
+def test_inverse_kinematics_out_of_reach_is_exit_code_one() -> None:
+    result = run("ik", "ur5e", "tool0", "--xyz", "2,0,0")
+    assert result.returncode == 1
+    assert "no joint vector reaches the target" in result.stdout
+
+
 def test_picking_a_mesh_writes_the_episode_and_the_report(tmp_path: Path) -> None:
     (tmp_path / "cube.obj").write_text(CUBE)
     result = run("pick", "cube.obj", "--mass", "0.1", "--seed", "1", "--out", "out", "--json", cwd=tmp_path)
@@ -65,6 +97,9 @@ MISTAKES = {
     "hostile XML": (["pick", "mug", "--robot", "bomb.urdf"], "bomb.urdf"),
     "malformed XML": (["pick", "mug", "--robot", "broken.urdf"], "broken.urdf"),
     "two descriptions": (["pick", "key.toml", "--robot", "panda"], "--robot"),
+    "unknown frame": (["fk", "ur5e", "tol0"], "Did you mean 'tool0'"),
+    "too few joints": (["fk", "ur5e", "--q", "1,2"], "has 2 numbers; expected 6"),
+    "words for numbers": (["ik", "ur5e", "tool0", "--xyz", "a,b,c"], "--xyz is 'a,b,c'"),
     "no episode": (["view", "out"], "out"),
 }
 

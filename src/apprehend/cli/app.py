@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import typer
 
-from . import grasp, pick, trajectory, view
+from . import fk, grasp, ik, pick, robots, trajectory, view
 
 app = typer.Typer(name="apprehend", add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
 app.command("pick", help="Pick an object and place it: plan, simulate, judge.")(pick.command)
 app.command("view", help="Replay an episode in the browser, or look at a body or a robot.")(view.command)
+app.command("robots", help="The catalogue, or one robot: its tree, limits and DH table.")(robots.command)
+app.command("fk", help="Poses of a robot's frames.")(fk.command)
+app.command("jacobian", help="The Jacobian of a frame, its singular values and manipulability.")(fk.jacobian)
+app.command("ik", help="Joint values for a pose, or why there are none.")(ik.command)
 app.add_typer(grasp.app, name="grasp")
 app.command("forces", help="Optimal contact forces against a wrench.")(grasp.forces)
 app.command("trajectory", help="Time a path through waypoints within proven limits.")(trajectory.command)
