@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from ._jit import kernel
+from .ik_box import box_error, turn_columns
 from .ik_chain import (
     AGE,
     ERR,
@@ -23,14 +24,12 @@ from .ik_chain import (
     L,
     add_columns,
     advance,
-    box_error,
     columns,
     forward,
     gram,
     hold_limits,
     pose_error,
     solve_dual,
-    turn_columns,
 )
 
 TURN = 2.0 * math.pi

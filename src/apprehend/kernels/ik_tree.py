@@ -12,7 +12,8 @@ import math
 import numpy as np
 
 from ._jit import kernel
-from .ik_chain import FLOOR, LOOSE, PATIENCE, STALL, STEP
+from .ik_box import LOOSE
+from .ik_chain import FLOOR, PATIENCE, STALL, STEP
 from .ik_queue import uniform
 from .ik_step import normal_equations
 from .ik_tasks import task_block
