@@ -29,6 +29,8 @@ KEPT_PAIRS = 400
 """Closing lines that are tried with every approach angle."""
 ENOUGH, MORE = 10, 4
 """With fewer grasps than ENOUGH, a second pass tries MORE times as many samples."""
+SHIFTS = (0.0, 0.5, 0.85, -0.6)
+"""Depths that are tried, in halves of the pad: in its middle, towards the tip, at the tip, deeper."""
 FINGER = 0.004
 """No finger is thinner than this, in m."""
 WEIGHTS = {"cone": 0.3, "force": 0.25, "centre": 0.25, "coverage": 0.2}
@@ -168,7 +170,7 @@ class Search:
         placed = np.zeros(len(tcp), bool)
         tcp = tcp.copy()
         code = np.full(len(tcp), -1, np.int64)
-        for shift in (0.0, 0.6, -0.6):  # in halves of the pad: first deep in the middle, then at the tip, then deeper
+        for shift in SHIFTS:
             moved = tcp[pending].copy()
             moved[:, :3, 3] -= shift * half * moved[:, :3, 2]
             hit = postures.obstacles(
