@@ -13,8 +13,8 @@ from PIL import Image as Pillow
 from apprehend import Body
 from apprehend.bodies import shapes
 from apprehend.errors import InputError
-from apprehend.viewer import Camera, Item, jpeg, png, render
-from apprehend.viewer.picture import _axes, corners_of, smooth_normals
+from apprehend.viewer import Camera, Item, jpeg, png
+from apprehend.viewer.picture import _axes, corners_of, render, smooth_normals
 
 RED = (0.8, 0.1, 0.1, 1.0)
 

@@ -1,8 +1,9 @@
 """The viewer: pictures without a graphics card, the report of an episode, and live pages in the browser."""
 
+from .draw import render
 from .live import Page
 from .pages import show_body, show_grasp, show_robot
-from .picture import Camera, Image, Item, jpeg, png, render
+from .picture import Camera, Image, Item, jpeg, png
 from .replay import show
 from .report import write_report
 from .stage import Stage

@@ -1,0 +1,70 @@
+"""`render`: a picture of whatever there is: a scene, a robot, a body, a stage, or bare meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import as_shaped
+from ..errors import InputError
+from . import picture
+from .looks import link_parts
+from .picture import Image, Item
+from .stage import BODY_COLOURS, GHOST_ALPHA, Stage, Thing, box
+
+if TYPE_CHECKING:
+    from ..bodies import Body
+    from ..collision import Scene
+    from ..kinematics import Robot
+
+
+def render(what: Scene | Robot | Body | Stage | Sequence[Item], q: ArrayLike | None = None, **options: Any) -> Image:
+    """The picture ``(height, width, 3)`` of *what*, the robot in it at *q* ``(n,)`` (else at home).
+
+    *options* are those of `picture.render`: ``camera``, ``size``, ``floor``, ``focus``, ``background``.
+    """
+    if isinstance(what, Sequence):
+        if q is not None:
+            raise InputError("q is given, but there is no robot among bare meshes; pass a robot or a scene")
+        return picture.render(what, **options)
+    stage = stage_of(what)
+    if q is not None and stage.robot is None:
+        raise InputError("q is given, but there is no robot in what is to be drawn")
+    joints = None if q is None or stage.robot is None else as_shaped(q, "q", stage.robot.n)
+    items = stage.items(joints)
+    if stage.boxes and "focus" not in options:
+        cast = stage.items(joints)[: len(items) - len(stage.boxes) - len(stage.ghosts)]
+        if cast:
+            options["focus"] = picture.bounds(cast)
+    return picture.render(items, **options)
+
+
+def stage_of(what: Scene | Robot | Body | Stage) -> Stage:
+    """The stage with *what* on it."""
+    from ..bodies import Body
+    from ..collision import Scene
+    from ..kinematics import Robot
+
+    if isinstance(what, Stage):
+        return what
+    if isinstance(what, Robot):
+        return Stage(what, link_parts(what.description))
+    if isinstance(what, Body):
+        return Stage(bodies=(Thing(what.name, what.vertices, what.faces, np.eye(4), BODY_COLOURS[0]),))
+    if isinstance(what, Scene):
+        names = sorted(what.bodies, key=lambda name: name != what.pick)
+        things = {}
+        for i, name in enumerate(names):
+            placed = what.bodies[name]
+            colour = BODY_COLOURS[i % len(BODY_COLOURS)]
+            things[name] = Thing(name, placed.body.vertices, placed.body.faces, placed.pose, colour)
+        boxes = tuple(box(b.name, b.size.tolist(), b.pose, b.rgba) for b in what.boxes)
+        ghosts = tuple(
+            Thing(f"goal of {name}", things[name].vertices, things[name].faces, pose, (0.25, 0.62, 0.36, GHOST_ALPHA))
+            for name, pose in what.goals.items()
+        )
+        return Stage(what.robot, link_parts(what.robot.description), tuple(things.values()), boxes, ghosts)
+    raise InputError(f"cannot draw a {type(what).__name__}; expected a scene, robot, body, stage, or a list of Items")
