@@ -152,7 +152,7 @@ def test_against_coal() -> None:
 def test_climbed_hulls_agree_with_searched_ones() -> None:
     """A hull of many vertices is climbed; the same hull as several small ones is searched."""
     rng = np.random.default_rng(7)
-    points = rng.normal(size=(400, 3))
+    points = rng.normal(size=(120, 3))
     points /= np.linalg.norm(points, axis=1)[:, None]
     whole, other = Convex.hull(points), Convex.box([0.5, 0.4, 0.3])
     corners = points[whole_faces(points)]

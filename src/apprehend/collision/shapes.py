@@ -16,7 +16,7 @@ from ..robots import load_shape_mesh
 from ..robots.description import Link, Shape, ShapeKind
 
 FILLED = 0.85
-"""A mesh that fills this share of its convex hull is taken as the hull; below, it is split into convex pieces."""
+"""A closed mesh that fills this share of its convex hull is taken as the hull; others are cut into a few hulls."""
 
 ROUND_OFF = 1e-9
 """Bounds of shapes are enlarged by this share, so that rounding never makes them too small."""
@@ -180,15 +180,16 @@ def hulls(pieces: Iterable[tuple[Array, IntArray]]) -> tuple[Convex, ...]:
 
 
 def mesh_hulls(vertices: Array, faces: IntArray) -> tuple[Convex, ...]:
-    """A mesh as convex shapes: its hull where the mesh fills it (`FILLED`), else convex pieces."""
-    hull = Convex.hull(vertices)
-    filled, whole = _volume(vertices, faces), _volume(hull.points, hull.faces)
-    if whole <= 0.0 or not 0.0 < filled < FILLED * whole:
-        return (hull,)
-    from ..bodies.convex import decompose
+    """A mesh as convex shapes that contain it: its hull where it is closed and fills that (`FILLED`), else a few."""
     from ..bodies.topology import is_closed
+    from .split import split
 
-    return hulls(decompose(vertices, faces, is_closed(faces)).pieces)
+    hull = Convex.hull(vertices)
+    if not len(hull.faces) or (
+        is_closed(faces) and _volume(vertices, faces) >= FILLED * _volume(hull.points, hull.faces)
+    ):
+        return (hull,)
+    return tuple(Convex.hull(points) for points in split(vertices, faces))
 
 
 def _volume(vertices: Array, faces: IntArray) -> float:
