@@ -56,6 +56,14 @@ class ChainModel(NamedTuple):
 
 
 @kernel
+def lane_buffer(components):
+    """An uninitialised flat lane buffer that begins on a cache line: no vector load then straddles two."""
+    raw = np.empty(components * LANES + 8)
+    start = ((64 - (raw.ctypes.data & 63)) & 63) >> 3
+    return raw[start : start + components * LANES]
+
+
+@kernel
 def load_block(q, first, count, out):
     """Rows ``first … first + LANES`` of ``q (N, n)`` into lanes ``out (n * LANES)``; past *count*, the last row again.
 
@@ -288,10 +296,10 @@ def store_pose(pose, first, count, out):
 @kernel
 def chain_poses(model, q, start, stop, out):
     """Poses ``out (N, 16)`` of rows start … stop of ``q (N, n)``; returns the first row that is not finite, or −1."""
-    buffer = np.empty(q.shape[1] * LANES)
-    value = np.empty(LANES)
-    pose = np.empty(12 * LANES)
-    axes = np.empty(6 * model.kind.shape[0] * LANES)
+    buffer = lane_buffer(q.shape[1])
+    value = lane_buffer(1)
+    pose = lane_buffer(12)
+    axes = lane_buffer(6 * model.kind.shape[0])
     bad = -1
     for first in range(start, stop, LANES):
         row = load_block(q, first, stop, buffer)
@@ -310,11 +318,11 @@ def chain_jacobians(model, q, start, stop, reference, out, poses):
     """
     n = q.shape[1]
     k = model.free.shape[0]
-    buffer = np.empty(n * LANES)
-    value = np.empty(LANES)
-    pose = np.empty(12 * LANES)
-    axes = np.empty(6 * model.kind.shape[0] * LANES)
-    jacobian = np.empty(6 * k * LANES)
+    buffer = lane_buffer(n)
+    value = lane_buffer(1)
+    pose = lane_buffer(12)
+    axes = lane_buffer(6 * model.kind.shape[0])
+    jacobian = lane_buffer(6 * k)
     bad = -1
     for first in range(start, stop, LANES):
         row = load_block(q, first, stop, buffer)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-from .chain import PRISMATIC, REVOLUTE, at, load_block, within_sincos, wrap_angles
+from .chain import PRISMATIC, REVOLUTE, at, lane_buffer, load_block, within_sincos, wrap_angles
 from .lanes import LANES, sincos
 
 WIDTH = 27
@@ -240,12 +240,12 @@ def inverse_dynamics(model, q, qd, qdd, gravity, start, stop, out):
     """
     n = q.shape[1]
     m = model.kind.shape[0]
-    bq = np.empty(n * LANES)
+    bq = lane_buffer(n)
     bqd = np.zeros(n * LANES)
     bqdd = np.zeros(n * LANES)
-    scratch = np.empty(9 * LANES)
-    state = np.empty((m + 1) * WIDTH * LANES)
-    tau = np.empty(n * LANES)
+    scratch = lane_buffer(9)
+    state = lane_buffer((m + 1) * WIDTH)
+    tau = lane_buffer(n)
     bad = -1
     for first in range(start, stop, LANES):
         row = load_block(q, first, stop, bq)

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-from .chain import REVOLUTE, at, load_block
+from .chain import REVOLUTE, at, lane_buffer, load_block
 from .dynamics import WIDTH, inverse_block
 from .lanes import LANES
 from .linalg import entry, factor_block, solve_block
-from .tree import tree_block
+from .tree import tree_through
 
 
 @kernel
@@ -116,11 +116,11 @@ def _axis_and_momentum(i, turning, origin, poses, composite, screw):
 def mass_block(model, q, origin, scratch, poses, composite, screw, M):
     """Mass matrix of one block: a packed triangle (see `linalg`).
 
-    Buffers on lanes: ``scratch (12)``, ``poses (12 m)``, ``composite (10 m)``, ``screw (12 m)``.
+    Buffers on lanes: ``scratch (13)``, ``poses (12 m)``, ``composite (10 m)``, ``screw (12 m)``.
     """
     L = LANES
     m = model.kind.shape[0]
-    tree_block(model, q, scratch, poses)
+    tree_through(model, q, scratch[12 * L :], scratch, poses)
     for i in range(m):
         _inertia_in_world(i, model.inertia, origin, poses, composite)
     for j in range(M.shape[0]):
@@ -170,12 +170,12 @@ def mass_matrix(model, q, start, stop, out):
     """Mass matrices ``out (N, n, n)`` of rows start … stop of ``q (N, n)``; returns the first row not finite, or −1."""
     n = q.shape[1]
     m = model.kind.shape[0]
-    buffer = np.empty(n * LANES)
-    scratch = np.empty(12 * LANES)
-    poses = np.empty(12 * m * LANES)
-    composite = np.empty(10 * m * LANES)
-    screw = np.empty(12 * m * LANES)
-    M = np.empty(n * (n + 1) // 2 * LANES)
+    buffer = lane_buffer(n)
+    scratch = lane_buffer(13)
+    poses = lane_buffer(12 * m)
+    composite = lane_buffer(10 * m)
+    screw = lane_buffer(12 * m)
+    M = lane_buffer(n * (n + 1) // 2)
     origin = np.zeros(3)
     if m:
         origin[:] = model.place[0, 9:12]
@@ -186,11 +186,10 @@ def mass_matrix(model, q, start, stop, out):
             bad = row
         mass_block(model, buffer, origin, scratch, poses, composite, screw, M)
         block = out[first : min(first + LANES, stop)]
-        for i in range(n):
-            for j in range(i + 1):
-                e = entry(i, j)
-                for lane in range(block.shape[0]):
-                    value = M[e + lane]
+        for lane in range(block.shape[0]):
+            for i in range(n):
+                for j in range(i + 1):
+                    value = M[entry(i, j) + lane]
                     block[lane, i, j] = value
                     block[lane, j, i] = value
     return bad
@@ -205,19 +204,19 @@ def forward_dynamics(model, q, qd, tau, gravity, start, stop, out):
     """
     n = q.shape[1]
     m = model.kind.shape[0]
-    bq = np.empty(n * LANES)
-    bqd = np.empty(n * LANES)
-    btau = np.empty(n * LANES)
+    bq = lane_buffer(n)
+    bqd = lane_buffer(n)
+    btau = lane_buffer(n)
     zero = np.zeros(n * LANES)
-    scratch = np.empty(12 * LANES)
-    bias = np.empty(n * LANES)
+    scratch = lane_buffer(13)
+    bias = lane_buffer(n)
     # the torques' state is done with when the mass matrix begins: one workspace for both stays in the nearest cache
-    state = np.empty(max(WIDTH * (m + 1), 34 * m) * LANES)
+    state = lane_buffer(max(WIDTH * (m + 1), 34 * m))
     poses = state[: 12 * m * LANES]
     composite = state[12 * m * LANES : 22 * m * LANES]
     screw = state[22 * m * LANES :]
-    M = np.empty(n * (n + 1) // 2 * LANES)
-    size = np.empty(n * LANES)
+    M = lane_buffer(n * (n + 1) // 2)
+    size = lane_buffer(n)
     origin = np.zeros(3)
     if m:
         origin[:] = model.place[0, 9:12]

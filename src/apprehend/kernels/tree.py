@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .chain import PRISMATIC, REVOLUTE, at, load_block, within_sincos, wrap_angles
+from .chain import PRISMATIC, REVOLUTE, at, lane_buffer, load_block, within_sincos, wrap_angles
 from .lanes import LANES, sincos
 
 
@@ -143,13 +143,21 @@ def revolve_through(place, i, q, coordinate, multiplier, offset, poses, parent, 
             poses[t + (9 + k) * L + lane] = scratch[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
 
 
-@kernel(inline=True)
+@kernel
 def tree_block(model, q, value, poses):
-    """Moved frames of all joints, ``poses (12 * m * LANES)``, of ``q (n * LANES)``; *value* ``(LANES)`` is scratch."""
+    """`tree_through` with a scratch of its own."""
+    tree_through(model, q, value, lane_buffer(12), poses)
+
+
+@kernel(inline=True)
+def tree_through(model, q, value, scratch, poses):
+    """Moved frames of all joints, ``poses (12 * m * LANES)``, of ``q (n * LANES)``.
+
+    *value* ``(LANES)`` and *scratch* ``(12 * LANES)`` are written over.
+    """
     gain = model.gain
     coordinate = model.coordinate
     near = within_sincos(q, model)
-    scratch = np.empty(12 * LANES)
     parents = model.parent
     kind = model.kind
     place = model.place
@@ -176,17 +184,17 @@ def tree_poses(model, q, start, stop, out):
     Returns the first row that is not finite, or −1.
     """
     m = model.kind.shape[0]
-    buffer = np.empty(q.shape[1] * LANES)
-    value = np.empty(LANES)
-    scratch = np.empty(12 * LANES)
-    poses = np.empty(12 * (m + 1) * LANES)
+    buffer = lane_buffer(q.shape[1])
+    value = lane_buffer(1)
+    scratch = lane_buffer(12)
+    poses = lane_buffer(12 * (m + 1))
     frame = m
     bad = -1
     for first in range(start, stop, LANES):
         row = load_block(q, first, stop, buffer)
         if row >= 0 and bad < 0:
             bad = row
-        tree_block(model, buffer, value, poses)
+        tree_through(model, buffer, value, scratch, poses)
         for f in range(model.frame_joint.shape[0]):
             carry_through(model.frame_place, f, poses, model.frame_joint[f], frame, scratch)
             t = 12 * frame * LANES
@@ -264,10 +272,11 @@ def centers_of_mass(model, q, start, stop, out):
     """Centres of mass ``out (N, 3)`` in the world of rows start … stop of ``q (N, n)``; the first bad row, or −1."""
     L = LANES
     m = model.kind.shape[0]
-    buffer = np.empty(q.shape[1] * L)
-    value = np.empty(L)
-    poses = np.empty(12 * m * L)
-    total = np.empty(3 * L)
+    buffer = lane_buffer(q.shape[1])
+    value = lane_buffer(1)
+    scratch = lane_buffer(12)
+    poses = lane_buffer(12 * m)
+    total = lane_buffer(3)
     inertia = model.inertia
     mass = inertia[:, 0].sum()
     bad = -1
@@ -275,7 +284,7 @@ def centers_of_mass(model, q, start, stop, out):
         row = load_block(q, first, stop, buffer)
         if row >= 0 and bad < 0:
             bad = row
-        tree_block(model, buffer, value, poses)
+        tree_through(model, buffer, value, scratch, poses)
         for k in range(3):
             for lane in range(L):
                 total[k * L + lane] = inertia[m, 1 + k]
