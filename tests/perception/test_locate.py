@@ -187,3 +187,16 @@ def test_bad_arguments() -> None:
         locate(image, body, rng=rng, region=[[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]])
     with pytest.raises(InputError, match="guess"):
         locate(image, body, rng=rng, guess=2.0 * np.eye(4))
+    with pytest.raises(InputError, match=r"guess has shape \(3, 4, 4\); expected one pose"):
+        locate(image, body, rng=rng, guess=np.tile(np.eye(4), (3, 1, 1)))
+    with pytest.raises(InputError, match="the normal must have length 1"):
+        Plane((0.0, 0.0, 2.0))
+
+
+def test_two_of_a_kind_are_told_apart_from_one() -> None:
+    can = Body.cylinder(0.035, 0.1, mass=0.3)
+    one, two = translation(0.5, -0.15, 0.05), translation(0.5, 0.15, 0.05)
+    result = locate(picture(one=(can, one), two=(can, two)), can, rng=np.random.default_rng(0))
+    assert result.status is LocateStatus.AMBIGUOUS
+    found = [result.pose, *result.alternatives]
+    assert all(min(offset(can, pose, T) for pose in found) < 0.002 for T in (one, two))

@@ -95,7 +95,7 @@ def locate(
     look; *guess* (4, 4), an approximate T_world_body, is refined instead of searched for, as with a hand camera
     near the object; *resting* says that the body stands or lies on the plane; *noise* is that of the sensor.
 
-    Raises `InputError` for no view, or a region that is not a box.
+    Raises `InputError` for no view, a region that is not a box, or a guess that is not one pose.
     """
     images = [views] if isinstance(views, DepthImage) else list(views)
     if not images:
@@ -105,6 +105,8 @@ def locate(
     if corners is not None and not (corners.shape == (2, 3) and (corners[0] < corners[1]).all()):
         raise InputError("region must hold a lower corner and an upper corner, (2, 3), lower below upper everywhere")
     start = None if guess is None else as_pose(guess, "guess")
+    if start is not None and start.shape != (4, 4):
+        raise InputError(f"guess has shape {start.shape}; expected one pose (4, 4)")
     surface = ModelSurface(body)
     clearance = _clearance(images, sensor)
     found: list[_Candidate] = []

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array, BoolArray, IntArray
+from ..errors import InputError
 from .camera import DepthImage
 
 CONNECT = 0.012  # m between neighbouring points of one object
@@ -19,6 +20,13 @@ class Plane:
 
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
     offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        length = float(np.linalg.norm(self.normal))
+        if not (np.isfinite(self.offset) and abs(length - 1.0) < 1e-6):
+            raise InputError(
+                f"a plane has normal {self.normal} and offset {self.offset}; the normal must have length 1"
+            )
 
     def height(self, points: Array) -> Array:
         """Signed heights (...) of points (..., 3) above the plane, in m."""
