@@ -218,6 +218,10 @@ class Search:
         self.rejected["pads meet no surface"] = int((~fits).sum())
         self.rejected["slips: outside the friction cones"] = int((fits & ~firm).sum())
         i = np.nonzero(firm)[0]
+        off = self.surface.nearest(points[i].reshape(-1, 3))[1].reshape(-1, 2).max(axis=1)
+        whole = off <= 2.0 * self.s.compliance  # else the pad rests on two ridges, with nothing in between
+        self.rejected["pads bridge a hollow"] = int((~whole).sum())
+        i = i[whole]
         tcp = tcp[i].copy()
         tcp[:, :3, 3] += 0.5 * (out[i, 0, 0] + out[i, 1, 0])[:, None] * tcp[:, :3, 0]
         away = self._com_distance(points[i, 0], line[i])
