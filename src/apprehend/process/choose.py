@@ -83,7 +83,7 @@ def choose(context: Context) -> tuple[Choice | None, Counter[str]]:
     if not order:
         return None, reasons
     poses = np.array([context.pose @ candidates[i].pose for i in order])
-    found = ik.solve(context.robot, poses, context.hand.root, n_solutions=POSTURES, rng=context.rng)
+    found = ik.solve(context.robot, poses, context.hand.root, n_solutions=POSTURES, diagnose=False, rng=context.rng)
     for k, i in enumerate(order):
         context.tell(f"grasp {k + 1} of {len(order)}")
         if not found.found[k]:
@@ -135,7 +135,7 @@ def _feasible(context: Context, models: Models, index: int, postures: Array) -> 
 def place_line(context: Context, models: Models, q: Array, held: Array) -> Array | None:
     """The straight set-down ``(m, n)`` from `LIFT` above the goal, in a posture near *q*; None where there is none."""
     T = context.goal @ np.linalg.inv(held)
-    found = ik.solve(context.robot, T, context.hand.root, q, n_solutions=POSTURES, rng=context.rng)
+    found = ik.solve(context.robot, T, context.hand.root, q, n_solutions=POSTURES, diagnose=False, rng=context.rng)
     model = models.supported(held)
     if not found.success:
         return None
