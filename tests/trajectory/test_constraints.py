@@ -130,6 +130,28 @@ def test_contradicting_constraints_are_named() -> None:
     assert "the push" in timing.explain()
 
 
+def test_what_happens_between_the_samples_is_accounted_for(monkeypatch) -> None:
+    class Noise:
+        """Far from quadratic between the samples of a coarse grid."""
+
+        def rows(self, path, s):
+            rough = 1e3 * np.sin(1e5 * s)[:, None] ** 2
+            zero = np.zeros_like(rough)
+            return tj.Rows(zero, 1.0 + rough, zero, np.full(1, -np.inf), np.ones(1), ("noise",))
+
+    def solve() -> tj.Timing:
+        path = tj.polyline([[0.0], [1.0]])
+        return tj.time_optimal(path, tj.Limits(velocity=1.0, acceleration=2.0), constraints=[Noise()], grid=20)
+
+    timing = solve().require_success()
+    assert timing.margin > 0.1
+    assert timing.duration > 10.0  # ṡ² ≤ 1/1001 at the peaks
+    monkeypatch.setattr("apprehend.trajectory.timing.MARGIN_ROUNDS", 1)
+    coarse = solve()
+    assert coarse.status is tj.TimingStatus.COARSE
+    assert "noise varies too fast between the samples" in coarse.explain()
+
+
 def test_custom_path_is_replaced_by_polynomials() -> None:
     class Circle:
         n = 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any
 
@@ -24,6 +24,8 @@ from .sampled import Sampled, sample
 
 MARGIN = 1e-11
 """Relative margin inside every limit that absorbs the rounding of the arithmetic."""
+MARGIN_ROUNDS = 8
+"""Rounds in which the margin of sampled constraints grows to what the speeds found need."""
 POWER_ROUNDS = 24
 """Timings tried for power limits, each starting from the speeds of the one before."""
 
@@ -35,6 +37,7 @@ class TimingStatus(Status):
     INFEASIBLE = "No speed along the path keeps the limits at some place."
     START_SPEED = "The given start speed cannot be continued within the limits."
     END_SPEED = "The given end speed cannot be reached within the limits."
+    COARSE = "The constraints cannot be proven between the samples of this grid; a finer one is needed."
     STALLED = "The limits force the motion to a standstill in the middle of the path."
 
 
@@ -198,20 +201,17 @@ class _Problem:
 def _with_margins(problem: _Problem, found: Sampled, power_of: Array | None) -> Timing:
     """Solve, bound what the sampled functions do between their samples at the speeds found, and tighten by that."""
     margins = np.zeros(found.bounds.shape[:2])
-    timing = problem.solve(None)
-    for _ in range(6):
-        tightened = found.tightened(margins, power_of)
-        timing = problem.solve(tightened)
+    for _ in range(MARGIN_ROUNDS):
+        timing = problem.solve(found.tightened(margins, power_of))
         if not timing.success:
             return timing
-        needed = found.remainder(timing.speed**2, problem.grid)
-        if (needed <= margins + 1e-13).all():
-            break
-        margins = np.maximum(margins, 1.25 * needed)
-    return Timing(
-        timing.status, timing.path, timing.limits, timing.grid, timing.speed, timing.t, timing.timing,
-        margin=found.share(margins),
-    )  # fmt: skip
+        short = found.remainder(timing.speed**2, problem.grid) - margins
+        if (short <= 1e-13).all():
+            return replace(timing, margin=found.share(margins))
+        margins += 1.25 * np.maximum(short, 0.0)
+    i, e = (int(k) for k in np.unravel_index(short.argmax(), short.shape))
+    reason = f"{found.names[e]} varies too fast between the samples of this grid"
+    return replace(timing, status=TimingStatus.COARSE, s=float(problem.grid[i]), reason=reason)
 
 
 def _within_power(problem: _Problem, found: Sampled, timing: Timing) -> Timing:
