@@ -9,8 +9,8 @@ import pytest
 
 from apprehend.bodies import Body
 from apprehend.collision import Box, Placed, RobotSource, Scene
+from apprehend.collision.rotations import matrix_quaternion, quaternion_matrix, rpy_matrix
 from apprehend.collision.scene import end_link, has_hand
-from apprehend.collision.scene_file import matrix_quaternion, quaternion_matrix, rpy_matrix
 from apprehend.errors import ApprehendError, DescriptionError, InputError, UnknownNameError
 from tests.collision.makers import gantry, planar, pose, rotation
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from apprehend.collision import Box, CollisionModel, RobotSource, Scene
-from apprehend.collision.scene_file import matrix_quaternion
+from apprehend.collision.rotations import matrix_quaternion
 from apprehend.errors import InputError
 from apprehend.planning import PlanStatus, straight
 from apprehend.planning.straight import DEVIATION, Line

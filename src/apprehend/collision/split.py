@@ -28,14 +28,14 @@ PLACES = (0.2, 0.35, 0.5, 0.65, 0.8)
 
 def split(vertices: Array, faces: IntArray) -> tuple[Array, ...]:
     """Points of the hulls of the parts, ``(V, 3)`` each; from the cache where the same mesh was split before."""
-    key = hashlib.sha256(f"1:{PARTS}:{WORTH}:{PLACES}".encode())
+    key = hashlib.sha256(f"2:{PARTS}:{WORTH}:{PLACES}".encode())
     key.update(np.ascontiguousarray(vertices).tobytes())
     key.update(np.ascontiguousarray(faces).tobytes())
     kept = cache_folder("parts") / f"{key.hexdigest()[:32]}.npz"
     try:
         with np.load(kept, allow_pickle=False) as data:
             return tuple(data[f"arr_{i}"] for i in range(len(data.files)))
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
         pass
     parts = tuple(_split(vertices[faces]))
     with replace_file(kept) as work:

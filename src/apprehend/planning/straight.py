@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, as_pose, as_shaped
 from ..collision import CollisionModel
-from ..collision.scene_file import matrix_quaternion, quaternion_matrix
+from ..collision.rotations import matrix_quaternion, quaternion_matrix
 from ..errors import InputError
 from ..kinematics import Robot
 from .plan import LIMIT_SLACK, moving_joints, violated
