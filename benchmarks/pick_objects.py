@@ -56,8 +56,8 @@ def main() -> None:
             good, total = good + wins, total + args.poses
             print(f"  {robot:8} {body.name:28} {wins} of {args.poses}", flush=True)
         print(
-            f"{robot}: {good} of {total} ({100 * good / max(total, 1):.0f} %), median wall time "
-            f"{np.median(walls):.1f} s, longest {np.max(walls):.1f} s, median slip {np.median(slips or [np.nan]):.2f} mm"
+            f"{robot}: {good} of {total} ({100 * good / max(total, 1):.0f} %), median wall time {np.median(walls):.1f} s, "
+            f"longest {np.max(walls):.1f} s, median slip {np.median(slips or [np.nan]):.2f} mm"
         )
 
 

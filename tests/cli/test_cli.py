@@ -76,7 +76,7 @@ def test_picking_a_mesh_writes_the_episode_and_the_report(tmp_path: Path) -> Non
 
 NAN = CUBE.replace("v 0 0 0.04", "v 0 nan 0.04")
 BIG = "\n".join(
-    "v " + " ".join(str(float(x) * 1000) for x in line.split()[1:]) if line.startswith("v") else line
+    "v " + " ".join(str(float(x) * 2250) for x in line.split()[1:]) if line.startswith("v") else line
     for line in CUBE.splitlines()
 )
 BOMB = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;">]><robot name="x"><link name="&b;"/></robot>'

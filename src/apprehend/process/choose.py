@@ -112,7 +112,7 @@ def _feasible(context: Context, models: Models, index: int, postures: Array) -> 
         back = line(context, models.open, q, T @ shift(-STANDOFF * approach_axis(candidate)))
         if back is None:
             continue
-        held: Array = np.linalg.inv(candidate.pose)
+        held = np.asarray(np.linalg.inv(candidate.pose), dtype=np.float64)
         closed = context.with_fingers(q, candidate.width)
         up = line(context, models.supported(held), closed, shift([0.0, 0.0, LIFT]) @ T)
         if up is None:
