@@ -55,8 +55,9 @@ def main() -> None:
                     print(f"    {robot} {body.name} seed {seed}: {episode.verdict.reason}", flush=True)
             good, total = good + wins, total + args.poses
             print(f"  {robot:8} {body.name:28} {wins} of {args.poses}", flush=True)
+        rate, typical = 100 * good / max(total, 1), np.median(walls)
         print(
-            f"{robot}: {good} of {total} ({100 * good / max(total, 1):.0f} %), median wall time {np.median(walls):.1f} s, "
+            f"{robot}: {good} of {total} ({rate:.0f} %), median wall time {typical:.1f} s, "
             f"longest {np.max(walls):.1f} s, median slip {np.median(slips or [np.nan]):.2f} mm"
         )
 

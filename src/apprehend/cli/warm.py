@@ -55,7 +55,8 @@ def arm() -> None:
     import numpy as np
 
     from .. import ik, planning, trajectory
-    from ..collision import CollisionModel, Scene
+    from ..collision import Box, CollisionModel, Scene
+    from ..collision.tabletop import translation
     from ..process.motion import FREE
     from ..trajectory import Limits
 
@@ -68,9 +69,13 @@ def arm() -> None:
     found = ik.solve(robot, (lower @ robot.fk(robot.home, root))[None], root, n_solutions=4, rng=rng)
     model.free(found.solutions(0))
     down = planning.straight(robot, model, robot.home, root, lower @ robot.fk(robot.home, root)).path
+    wall = Box("wall", np.array([0.4, 0.05, 1.4]), translation(0.75, 0.0, 0.7))  # something to plan around
+    beside = robot.home.copy()
+    beside[joints[0]] = -0.8
     goal = np.repeat(robot.home[None], 2, axis=0)
-    goal[:, joints[0]] = (1.5, -1.5)
-    way = planning.plan(model, robot.home, goal, rng=rng, joints=joints).path
+    goal[:, joints[0]] = (0.8, 0.9)
+    walled = CollisionModel(robot, scene.with_box(wall))
+    way = planning.plan(walled, beside, goal, rng=rng, joints=joints).path
     limits = Limits(velocity=np.full(len(joints), FREE), acceleration=np.full(len(joints), FREE))
     trajectory.through_samples(down[:, joints], limits)
     bent = np.concatenate([way[:, joints], down[-1:, joints]])
@@ -85,6 +90,7 @@ def grasp() -> None:
     import numpy as np
 
     from .. import grasp as room
+    from .. import viewer
     from ..collision import Scene
     from ..process import Context
     from ..process.grasping import support_plane
@@ -95,3 +101,4 @@ def grasp() -> None:
     assert context.pose is not None
     table = support_plane(context, context.pose)[None]
     room.plan(context.hand, context.body, 20, rng=context.rng, table=table)
+    viewer.render(context.scene, size=(64, 48))
