@@ -6,7 +6,8 @@ Solves many small problems of one shape::
 
 where K is a product of half-lines (size 1) and second-order cones ``{x : x₀ ≥ ‖x₁…‖}``. The homogeneous self-dual
 embedding (Ye, Todd and Mizuno 1994; with a quadratic term: Goulart and Chen, Clarabel, 2024) gives every problem an
-end: an optimum with its dual, or a certificate that there is none. Scaling by Nesterov and Todd, steps by Mehrotra.
+end: an optimum with its dual, or a certificate that there is none. Scaling by Nesterov and Todd (`kernels.cone_algebra`),
+steps by Mehrotra.
 
 A grasp has few rows (6 balance equations and the couplings of its limits), so a step is one small Cholesky factor of
 ``A M Aᵀ`` with ``M = (Q + W⁻²)⁻¹`` block-diagonal. Where a cone is active W is very stretched; M is therefore taken
@@ -20,106 +21,12 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
+from .cone_algebra import apply, room, scaling, second_order
 
 OPTIMAL, INFEASIBLE, UNBOUNDED, INACCURATE = 0, 1, 2, 3
 STEP = 0.995
 PROX = 1e-4
 PATIENCE = 6
-
-
-@kernel
-def _scaling(x, z, cones, starts, w, beta, lam):  # type: ignore[no-untyped-def]
-    """Nesterov–Todd scaling of each cone: unit vector w and factor β with ``W z = W⁻¹ x = λ``. False if it fails."""
-    for i in range(cones.shape[0]):
-        k, s = cones[i], starts[i]
-        if k == 1:
-            if not (x[s] > 0.0 and z[s] > 0.0):
-                return False
-            w[s], beta[i], lam[s] = 1.0, np.sqrt(x[s] / z[s]), np.sqrt(x[s] * z[s])
-            continue
-        xs, zs, xz = 0.0, 0.0, x[s] * z[s]
-        for j in range(s + 1, s + k):
-            xs += x[j] * x[j]
-            zs += z[j] * z[j]
-            xz += x[j] * z[j]
-        xs, zs = np.sqrt(xs), np.sqrt(zs)
-        if not (x[s] > xs and z[s] > zs):
-            return False
-        xn, zn = np.sqrt((x[s] - xs) * (x[s] + xs)), np.sqrt((z[s] - zs) * (z[s] + zs))
-        g = np.sqrt(0.5 * (1.0 + xz / (xn * zn)))
-        w[s] = 0.5 * (x[s] / xn + z[s] / zn) / g
-        beta[i] = np.sqrt(xn / zn)
-        dot = 0.0
-        for j in range(s + 1, s + k):
-            w[j] = 0.5 * (x[j] / xn - z[j] / zn) / g
-            dot += w[j] * z[j]
-        lam[s] = beta[i] * (w[s] * z[s] + dot)
-        t = dot / (1.0 + w[s]) + z[s]
-        for j in range(s + 1, s + k):
-            lam[j] = beta[i] * (z[j] + t * w[j])
-    return True
-
-
-@kernel
-def _apply(v, cones, starts, w, beta, sign, out):  # type: ignore[no-untyped-def]
-    """``W v`` (sign +1) or ``W⁻¹ v`` (sign −1)."""
-    for i in range(cones.shape[0]):
-        k, s = cones[i], starts[i]
-        b = beta[i] if sign > 0.0 else 1.0 / beta[i]
-        dot = 0.0
-        for j in range(s + 1, s + k):
-            dot += w[j] * v[j]
-        t = dot / (1.0 + w[s]) + sign * v[s]
-        out[s] = b * (w[s] * v[s] + sign * dot)
-        for j in range(s + 1, s + k):
-            out[j] = b * (v[j] + t * w[j])
-
-
-@kernel
-def _second_order(lam, a, b, minus, cones, starts, out):  # type: ignore[no-untyped-def]
-    """The u with ``λ ∘ u = a ∘ b − minus e`` in the Jordan algebra of each cone."""
-    for i in range(cones.shape[0]):
-        k, s = cones[i], starts[i]
-        if k == 1:
-            out[s] = (a[s] * b[s] - minus) / lam[s]
-            continue
-        d0, n2, dot = -minus, 0.0, 0.0
-        for j in range(s, s + k):
-            d0 += a[j] * b[j]
-        for j in range(s + 1, s + k):
-            out[j] = a[s] * b[j] + b[s] * a[j]
-            n2 += lam[j] * lam[j]
-            dot += lam[j] * out[j]
-        n = np.sqrt(n2)
-        u0 = (lam[s] * d0 - dot) / max((lam[s] - n) * (lam[s] + n), 1e-300)
-        out[s] = u0
-        for j in range(s + 1, s + k):
-            out[j] = (out[j] - u0 * lam[j]) / lam[s]
-
-
-@kernel
-def _room(x, d, cones, starts):  # type: ignore[no-untyped-def]
-    """The inverse of the largest α with ``x + α d`` in the cone, at least 0."""
-    worst = 0.0
-    for i in range(cones.shape[0]):
-        k, s = cones[i], starts[i]
-        if k == 1:
-            worst = max(worst, -d[s] / x[s])
-            continue
-        n2, dot = 0.0, 0.0
-        for j in range(s + 1, s + k):
-            n2 += x[j] * x[j]
-            dot += x[j] * d[j]
-        n = np.sqrt(n2)
-        norm = np.sqrt(max((x[s] - n) * (x[s] + n), 1e-300))
-        r0 = (x[s] * d[s] - dot) / norm
-        t = (r0 + d[s]) / (x[s] + norm)
-        r1 = 0.0
-        for j in range(s + 1, s + k):
-            e = d[j] - t * x[j]
-            r1 += e * e
-        worst = max(worst, (np.sqrt(r1) - r0) / norm)
-    return worst
 
 
 @kernel
@@ -359,7 +266,7 @@ def _one(A, b, c, Q, cones, starts, offsets, tolerance, limit, X, Y, Z, measures
                     measures[0], measures[1], measures[2], measures[3] = -np.inf, -np.inf, -error / cx, -error / cx
                     measures[4] = iteration
                     return UNBOUNDED
-        if not _scaling(X, Z, cones, starts, w, beta, lam):
+        if not scaling(X, Z, cones, starts, w, beta, lam):
             break
         _blocks(Q, cones, starts, offsets, w, beta, M, low)
         for r in range(rows):
@@ -385,10 +292,10 @@ def _one(A, b, c, Q, cones, starts, offsets, tolerance, limit, X, Y, Z, measures
                     q1[j] = -rd[j] - Z[j]
                 dk = kappa * tau
             else:
-                _apply(dx, cones, starts, w, beta, -1.0, wx)
-                _apply(dz, cones, starts, w, beta, 1.0, wz)
-                _second_order(lam, wx, wz, sigma * mu, cones, starts, ds)
-                _apply(ds, cones, starts, w, beta, -1.0, q1)
+                apply(dx, cones, starts, w, beta, -1.0, wx)
+                apply(dz, cones, starts, w, beta, 1.0, wz)
+                second_order(lam, wx, wz, sigma * mu, cones, starts, ds)
+                apply(ds, cones, starts, w, beta, -1.0, q1)
                 for j in range(n):
                     q1[j] = -(1.0 - sigma) * rd[j] - Z[j] - q1[j]
                 dk = kappa * tau + dtau * dkappa - sigma * mu
@@ -411,7 +318,7 @@ def _one(A, b, c, Q, cones, starts, offsets, tolerance, limit, X, Y, Z, measures
                     t += At[j, r] * dy[r]
                 dz[j] = Q[j] * dx[j] + c[j] * dtau + (1.0 - sigma) * rd[j] - t
             need = max(-dtau / tau, -dkappa / kappa)
-            need = max(need, max(_room(X, dx, cones, starts), _room(Z, dz, cones, starts)))
+            need = max(need, max(room(X, dx, cones, starts), room(Z, dz, cones, starts)))
             alpha = 1.0 / max(need, 1e-30)
             if phase == 0:
                 t = 1.0 - min(alpha, 1.0)
