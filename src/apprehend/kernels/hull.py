@@ -12,87 +12,12 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
+from .hull_support import BASES, POINTS, SUM, UNION, first_simplex, support
 
-POINTS, UNION, SUM, BASES = 0, 1, 2, 3
-"""Kinds of sets: hull of points (rows of *base*); hull of the union of cone bases and the origin (L1); sum of those
-(L∞); hull of the cone bases alone."""
+__all__ = ["BASES", "CLOSED", "FLAT", "FULL", "OUTSIDE", "POINTS", "SUM", "UNION", "closed", "grow", "support"]
 
 CLOSED, FLAT, OUTSIDE, FULL = 0, 1, 2, 3
 """Outcomes: interval found; the set does not span the space; the origin is not inside; no room or no steps left."""
-
-
-@kernel
-def support(kind, base, spread, box, shift, u, out):  # type: ignore[no-untyped-def]
-    """Support value of the set along *u*, and the point that attains it.
-
-    ``base (k, d)``: points, or axes of cone bases; ``spread (k, 3, d)``: half-axes of each base; a base is
-    ``axis + Σ s_j half_j`` with ``‖s‖ ≤ 1``, or with *box* ``(k,)`` ``s₀² + s₁² ≤ 1, |s₂| ≤ 1``. The whole set is
-    moved by ``−shift``.
-    """
-    value = _support(kind, base, spread, box, u, out)
-    for j in range(u.shape[0]):
-        out[j] -= shift[j]
-        value -= shift[j] * u[j]
-    return value
-
-
-@kernel
-def _support(kind, base, spread, box, u, out):  # type: ignore[no-untyped-def]
-    d = u.shape[0]
-    best, chosen, total = -np.inf, 0, 0.0
-    if kind == POINTS:
-        for i in range(base.shape[0]):
-            v = 0.0
-            for j in range(d):
-                v += base[i, j] * u[j]
-            if v > best:
-                best, chosen = v, i
-        for j in range(d):
-            out[j] = base[chosen, j]
-        return best
-    for j in range(d):
-        out[j] = 0.0
-    for i in range(base.shape[0]):
-        v, s0, s1, s2 = 0.0, 0.0, 0.0, 0.0
-        for j in range(d):
-            v += base[i, j] * u[j]
-            s0 += spread[i, 0, j] * u[j]
-            s1 += spread[i, 1, j] * u[j]
-            s2 += spread[i, 2, j] * u[j]
-        if box[i]:
-            v += np.sqrt(s0 * s0 + s1 * s1) + abs(s2)
-        else:
-            v += np.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
-        if kind == SUM and v > 0.0:
-            total += v
-            _reach(base[i], spread[i], box[i], s0, s1, s2, out)
-        elif v > best:
-            best, chosen = v, i
-    if kind == SUM:
-        return total
-    if kind == UNION and best <= 0.0:  # the origin belongs to the set
-        return 0.0
-    s0, s1, s2 = 0.0, 0.0, 0.0
-    for j in range(d):
-        s0 += spread[chosen, 0, j] * u[j]
-        s1 += spread[chosen, 1, j] * u[j]
-        s2 += spread[chosen, 2, j] * u[j]
-    _reach(base[chosen], spread[chosen], box[chosen], s0, s1, s2, out)
-    return best
-
-
-@kernel
-def _reach(axis, half, box, s0, s1, s2, out):  # type: ignore[no-untyped-def]
-    """Add to *out* the point of a base that is farthest along the direction with components s in the half-axes."""
-    if box:
-        n = np.sqrt(s0 * s0 + s1 * s1)
-        s2 = 1.0 if s2 > 0.0 else (-1.0 if s2 < 0.0 else 0.0)
-    else:
-        n = np.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
-        s2 = s2 / n if n > 0.0 else 0.0
-    s0, s1 = (s0 / n, s1 / n) if n > 0.0 else (0.0, 0.0)
-    for j in range(out.shape[0]):
-        out[j] += axis[j] + s0 * half[0, j] + s1 * half[1, j] + s2 * half[2, j]
 
 
 @kernel
@@ -145,61 +70,6 @@ def _plane(points, corners, facet, inside, normal, rows):  # type: ignore[no-unt
 
 
 @kernel
-def _start(kind, base, spread, box, shift, d, points, scale):  # type: ignore[no-untyped-def]
-    """Corners of a first simplex in ``points[0 … d]``: False if the set is flat to within *scale*."""
-    axes = np.zeros((d, d))
-    u, low, high = np.empty(d), np.empty(d), np.empty(d)
-    u[:] = 0.0
-    u[0] = 1.0
-    support(kind, base, spread, box, shift, u, points[0])
-    for i in range(d):
-        best = 0.0
-        for trial in range(d):  # directions square to the span so far
-            for j in range(d):
-                u[j] = 1.0 if j == trial else 0.0
-            for m in range(i):
-                t = axes[m, trial]
-                for j in range(d):
-                    u[j] -= t * axes[m, j]
-            n = 0.0
-            for j in range(d):
-                n += u[j] * u[j]
-            if n < 1e-4:
-                continue
-            for j in range(d):
-                u[j] /= np.sqrt(n)
-            for _ in range(2):
-                support(kind, base, spread, box, shift, u, high)
-                t = 0.0
-                for j in range(d):
-                    t += u[j] * (high[j] - points[0, j])
-                if abs(t) > best:
-                    best = abs(t)
-                    for j in range(d):
-                        low[j] = high[j]
-                for j in range(d):
-                    u[j] = -u[j]
-        if best <= scale:
-            return False
-        for j in range(d):
-            points[i + 1, j] = low[j]
-            axes[i, j] = low[j] - points[0, j]
-        for _ in range(2):
-            for m in range(i):
-                t = 0.0
-                for j in range(d):
-                    t += axes[i, j] * axes[m, j]
-                for j in range(d):
-                    axes[i, j] -= t * axes[m, j]
-        n = 0.0
-        for j in range(d):
-            n += axes[i, j] * axes[i, j]
-        for j in range(d):
-            axes[i, j] /= np.sqrt(n)
-    return True
-
-
-@kernel
 def grow(
     kind, base, spread, box, shift, tolerance, whole, steps, points, corners, near, planes, alive, codes, answer, worst
 ):  # type: ignore[no-untyped-def]
@@ -220,7 +90,7 @@ def grow(
     rounding = 1e-12 * size
     answer[:] = 0.0
     worst[:] = 0.0
-    if not _start(kind, base, spread, box, shift, d, points, 1e-9 * size):
+    if not first_simplex(kind, base, spread, box, shift, d, points, 1e-9 * size):
         return FLAT
     inside, u, p = np.zeros(d), np.empty(d), np.empty(d)
     rows = np.empty((d, d))
