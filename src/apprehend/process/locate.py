@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..arrays import Array
-from ..perception import Camera, LocateStatus, Noise, Plane, locate, look_at
+from ..bodies import Body
+from ..perception import Camera, LocateStatus, ModelSurface, Noise, Plane, locate, look_at, surface_distance
 from ..sim import look
+from ..spatial import Rotation
 from .context import Context
 from .judge import angle
 from .step import Outcome
@@ -21,6 +23,10 @@ DISTANCE, HEIGHT = 0.55, 0.65
 
 SEARCH = 0.3
 """Half the width in m of the region around the described place in which the object is looked for."""
+
+
+SAME = 1e-3
+"""Distance in m between the surfaces of two poses below which they are taken for the same."""
 
 
 @dataclass(frozen=True)
@@ -54,18 +60,37 @@ class Locate:
             result = locate(views, context.body, plane=plane, rng=context.rng, region=region, noise=self.noise)
         if result.status in (LocateStatus.NOT_SEEN, LocateStatus.POOR_FIT):
             return Outcome(False, result.explain())
-        context.pose = result.pose
+        context.pose = as_described(context.body, result.pose, described, result.covariance)
         truth = context.world.body_pose(context.name)
-        com = context.body.com
-        off = float(np.linalg.norm((result.pose - truth)[:3, :3] @ com + (result.pose - truth)[:3, 3]))
-        x, y, z = result.pose[:3, 3]
+        off = float(np.linalg.norm((context.pose - truth) @ np.append(context.body.com, 1.0)))
+        x, y, z = context.pose[:3, 3]
         return Outcome(
             True,
             f"{context.name} seen at ({x:.3f}, {y:.3f}, {z:.3f}) m, {off * 1e3:.1f} mm off the truth",
             inputs={"source": "two depth cameras", "pixels": result.pixels},
-            outputs={"pose": result.pose, "residual": result.residual, "fitness": result.fitness},
-            margins={"error": off, "turn": angle(truth[:3, :3].T @ result.pose[:3, :3])},
+            outputs={"pose": context.pose, "residual": result.residual, "fitness": result.fitness},
+            margins={"error": off, "turn": angle(truth[:3, :3].T @ context.pose[:3, :3])},
         )
+
+
+def as_described(body: Body, pose: Array, described: Array, covariance: Array) -> Array:
+    """Of all poses that put the surface of *body* where *pose* does, one that is turned like *described*.
+
+    A can looks the same however it is turned about its axis, so images leave that turn open; the task does not, for
+    its goal is a pose. Tried are the described orientation itself, and the one that differs from it by the smallest
+    rotation that agrees with *pose* on the axis about which *covariance* is largest.
+    """
+    surface = ModelSurface(body)
+    free = np.linalg.eigh(covariance[3:, 3:])[1][:, -1]
+    before = described[:3, :3] @ pose[:3, :3].T @ free
+    turns = (described[:3, :3], Rotation.between(before, free).matrix @ described[:3, :3])
+    centre = pose[:3, :3] @ body.com + pose[:3, 3]
+    for turn in turns:
+        other = np.eye(4)
+        other[:3, :3], other[:3, 3] = turn, centre - turn @ body.com
+        if surface_distance(surface, pose, other) < SAME:
+            return other
+    return pose
 
 
 @dataclass(frozen=True)
