@@ -17,6 +17,7 @@ from apprehend.process import (
     pick_and_place,
     shuffled,
 )
+from apprehend.process.grasping import Close
 
 
 @pytest.fixture(scope="module")
@@ -107,6 +108,30 @@ def test_steps_can_be_replaced() -> None:
     assert episode.verdict.reason == "Look failed: the camera is covered"
     with pytest.raises(UnknownNameError, match="Did you mean 'locate'"):
         process.replaced("localte", Blind())
+
+
+class Clumsy(Close):
+    """Closing that fails the first time."""
+
+    failures = 1
+
+    def run(self, context: Context) -> Outcome:
+        if Clumsy.failures:
+            Clumsy.failures -= 1
+            return Outcome(False, "the fingers slipped off", retry=True)
+        return super().run(context)
+
+
+def test_after_a_failed_grasp_another_one_is_tried() -> None:
+    Clumsy.failures = 1
+    process = Process.default().replaced("close", Clumsy())
+    episode = pick_and_place(Scene.tabletop(body="can"), seed=1, process=process)
+    assert episode.require_success()
+    names = [step.name for step in episode.steps]
+    assert names.count("plan") == 2
+    assert names.count("close") == 2
+    first, second = (step.outputs["pose"] for step in episode.steps if step.name == "plan")
+    assert not np.allclose(first, second)
 
 
 def test_a_scene_without_a_task_is_refused() -> None:

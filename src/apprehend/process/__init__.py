@@ -2,6 +2,7 @@
 
 from .context import Context
 from .episode import Episode, EpisodeStatus, StepRecord, StepStatus, Verdict, read_episode
+from .locate import Locate, LocateByState
 from .pipeline import Process, pick_and_place
 from .shuffle import shuffled
 from .step import Observer, Outcome, Step
@@ -10,6 +11,8 @@ __all__ = [
     "Context",
     "Episode",
     "EpisodeStatus",
+    "Locate",
+    "LocateByState",
     "Observer",
     "Outcome",
     "Process",

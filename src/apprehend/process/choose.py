@@ -103,7 +103,7 @@ def _feasible(context: Context, models: Models, index: int, postures: Array) -> 
     free = models.open.free(open_)
     if not free.any():
         return "arm or hand collides at the grasp"
-    distance = np.abs(open_ - context.world.q)[:, context.joints].max(axis=1)
+    distance = np.abs(open_ - context.q)[:, context.joints].max(axis=1)
     furthest = "the approach is blocked"
     for q in open_[np.argsort(distance)]:
         if not models.open.free(q):

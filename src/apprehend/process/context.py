@@ -27,8 +27,9 @@ RECORDING_RATE = 60.0
 class Context:
     """One run: the scene as described, the world as simulated, and what the steps found out so far.
 
-    *pose* is the located pose T_world_body; *plan* the ranked grasps; *choice* the grasp being carried out with its
-    arm postures; *tried* the grasps that failed; *held* the pose of the body in the hand, T_hand_body, once lifted.
+    *pose* is the located pose T_world_body; *plan* the ranked grasps, for the supporting *planes* (k, 4); *choice* the
+    grasp being carried out with its arm postures; *tried* the grasps that failed; *held* the pose of the body in the
+    hand, T_hand_body, once lifted.
     """
 
     scene: Scene
@@ -42,6 +43,7 @@ class Context:
     plan: GraspPlan | None = None
     choice: Choice | None = None
     held: Array | None = None
+    planes: Array = field(default_factory=lambda: np.zeros((0, 4)))
     tried: set[int] = field(default_factory=set)
     slip: float = 0.0
     dropped: bool = False
@@ -76,6 +78,11 @@ class Context:
     def goal(self) -> Array:
         """Where the body should go, T_world_body."""
         return self.scene.goals[self.name]
+
+    @property
+    def q(self) -> Array:
+        """The present joint vector; what a joint stands beyond its limit by, a hair in the simulation, is cut off."""
+        return self.robot.limits.clip(self.world.q)
 
     @property
     def robot(self) -> Robot:

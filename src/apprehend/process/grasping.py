@@ -17,9 +17,15 @@ from .step import Outcome
 GRASPS = 80
 """Grasps that are planned; the arm takes the best that it can carry out."""
 
+SAME_POSTURE = 0.05
+"""Largest change of the supporting planes (unit normal, offset in m) at which planned grasps stay good."""
+
 OPEN_TIME = 3.0
-FORCE_FACTOR = 1.5
-"""The grip is this many times what the planner computed to be needed, on top of its own safety factor."""
+SAFETY = 1.5
+"""Factor on weight and acceleration that a planned grasp must withstand."""
+
+FORCE_FACTOR = 1.4
+"""The grip is this many times what the planner computed to be needed, as far as the hand can press."""
 
 
 @dataclass(frozen=True)
@@ -30,14 +36,16 @@ class PlanGrasp:
     title: str = "Plan the grasp"
 
     def run(self, context: Context) -> Outcome:
-        """Set ``context.plan`` (once) and ``context.choice``."""
+        """Set ``context.plan``, unless there is one for this posture of the object, and ``context.choice``."""
         assert context.pose is not None
-        if context.plan is None or context.tried:
+        planes = np.array([support_plane(context, T) for T in (context.pose, context.goal)])
+        if context.plan is None or np.abs(planes - context.planes).max() > SAME_POSTURE:
             context.tell("searching the surface")
-            planes = np.array([support_plane(context, T) for T in (context.pose, context.goal)])
             context.plan = grasp.plan(
-                context.hand, context.body, GRASPS, rng=context.rng, table=planes, acceleration=ACCELERATION
-            )
+                context.hand, context.body, GRASPS, rng=context.rng, table=planes, safety=SAFETY,
+                acceleration=ACCELERATION,
+            )  # fmt: skip
+            context.planes, context.tried = planes, set()
         plan = context.plan
         if not plan.success:
             return Outcome(False, plan.explain())

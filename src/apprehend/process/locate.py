@@ -25,8 +25,11 @@ SEARCH = 0.3
 """Half the width in m of the region around the described place in which the object is looked for."""
 
 
-SAME = 1e-3
-"""Distance in m between the surfaces of two poses below which they are taken for the same."""
+SAME = 3e-3
+"""Distance in m between the surfaces of two poses below which noisy images do not tell them apart."""
+
+LARGE = 0.2
+"""Difference of two orientations in rad from which on it is an open turn, and no error of measurement."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,8 @@ def as_described(body: Body, pose: Array, described: Array, covariance: Array) -
     for turn in turns:
         other = np.eye(4)
         other[:3, :3], other[:3, 3] = turn, centre - turn @ body.com
-        if surface_distance(surface, pose, other) < SAME:
+        open_turn = angle(turn.T @ pose[:3, :3]) > LARGE
+        if open_turn and surface_distance(surface, pose, other) < SAME:
             return other
     return pose
 

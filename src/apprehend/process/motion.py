@@ -122,5 +122,5 @@ class Watch:
 
 
 def in_hand(context: Context) -> Array:
-    """The present pose of the body in the hand, T_hand_body."""
+    """The present pose of the body in the hand, T_hand_body: the simulator's, in the place of an in-hand tracker."""
     return np.asarray(np.linalg.inv(context.world.frame(context.hand.root)) @ context.world.body_pose(context.name))

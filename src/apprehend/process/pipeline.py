@@ -28,11 +28,11 @@ ATTEMPTS = 3
 
 @dataclass(frozen=True)
 class Process:
-    """Steps in order. Those up to *commit* are repeated with another grasp when a step asks for a retry."""
+    """Steps in order. Where one up to *commit* asks for it, the hand backs off and they start over from *again*."""
 
     steps: tuple[Step, ...]
     commit: str = "rate"
-    again: str = "plan"
+    again: str = "locate"
 
     @classmethod
     def default(cls) -> Process:

@@ -28,7 +28,7 @@ class Transport:
         """Plan with the object in the hand, as it is really held."""
         assert context.held is not None
         models = Models(context, np.asarray(context.world.body_pose(context.name)))
-        start = context.world.q
+        start = context.q
         down = place_line(context, models, start, context.held)
         if down is None:
             return Outcome(
@@ -64,7 +64,7 @@ class Place:
         held = in_hand(context)
         models = Models(context, np.asarray(context.world.body_pose(context.name)))
         target = context.goal @ np.linalg.inv(held)
-        result = planning.straight(context.robot, models.supported(held), context.world.q, context.hand.root, target)
+        result = planning.straight(context.robot, models.supported(held), context.q, context.hand.root, target)
         if not result.success:
             return Outcome(False, f"the set-down is blocked: {result.explain()}")
         motion = along_line(context, result.path, CAREFUL)
@@ -106,7 +106,7 @@ class Retreat:
     def run(self, context: Context) -> Outcome:
         """Back off along the approach direction, then plan home."""
         models = Models(context, context.world.body_pose(context.name))
-        q = context.world.q
+        q = context.q
         T = context.robot.fk(q, context.hand.root)
         nominal = context.chosen.retreat
         offset = np.linalg.inv(context.robot.fk(nominal[0], context.hand.root)) @ context.robot.fk(
@@ -122,7 +122,7 @@ class Retreat:
 
 def home_again(context: Context, models: Models) -> bool:
     """Go to the home posture where there is a way; the object's fate does not depend on it."""
-    start: Array = context.world.q
+    start: Array = context.q
     goal = start.copy()
     goal[context.joints] = context.robot.home[context.joints]
     result = planning.plan(

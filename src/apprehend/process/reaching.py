@@ -33,7 +33,7 @@ class Reach:
         """Plan in joint space, time within the limits, execute."""
         assert context.pose is not None
         model = Models(context, context.pose).free
-        start = context.world.q
+        start = context.q
         goal = start.copy()
         goal[context.joints] = context.chosen.approach[0][context.joints]
         result = planning.plan(
