@@ -20,6 +20,9 @@ STANDOFF = 0.08
 LIFT = 0.12
 """Height in m of the straight lift and of the straight set-down."""
 
+SHORTEST = 0.4
+"""Share of the standoff that backing off needs at the least."""
+
 POSTURES = 6
 """Arm postures that are tried for one pose of the hand."""
 
@@ -154,6 +157,17 @@ def line(context: Context, model: CollisionModel, q: Array, T: Array) -> Array |
     """Joint samples of the straight line of the hand from *q* to pose *T*, or None."""
     result = planning.straight(context.robot, model, q, context.hand.root, T)
     return result.path if result.success else None
+
+
+def withdraw(context: Context, model: CollisionModel, candidate: Candidate) -> Array | None:
+    """Joint samples of the straight way back from the object, as far as there is one, at least `SHORTEST` of it."""
+    q = context.q
+    T = context.robot.fk(q, context.hand.root)
+    for share in (1.0, 0.7, SHORTEST):
+        samples = line(context, model, q, T @ shift(-share * STANDOFF * approach_axis(candidate)))
+        if samples is not None:
+            return samples
+    return None
 
 
 def approach_axis(candidate: Candidate) -> Array:

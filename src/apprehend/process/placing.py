@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import planning
 from ..arrays import Array
-from .choose import LIFT, Models, place_line
+from .choose import LIFT, Models, place_line, withdraw
 from .context import Context
 from .motion import CAREFUL, CARRYING, FREE, along_line, along_path, execute, in_hand
 from .reaching import PLANNING_TIME, facts
@@ -106,16 +106,10 @@ class Retreat:
     def run(self, context: Context) -> Outcome:
         """Back off along the approach direction, then plan home."""
         models = Models(context, context.world.body_pose(context.name))
-        q = context.q
-        T = context.robot.fk(q, context.hand.root)
-        nominal = context.chosen.retreat
-        offset = np.linalg.inv(context.robot.fk(nominal[0], context.hand.root)) @ context.robot.fk(
-            nominal[-1], context.hand.root
-        )
-        back = planning.straight(context.robot, models.open, q, context.hand.root, T @ offset)
-        if not back.success:
-            return Outcome(False, f"the way back is blocked: {back.explain()}")
-        done = execute(context, along_line(context, back.path, CAREFUL))
+        back = withdraw(context, models.open, context.chosen.candidate)
+        if back is None:
+            return Outcome(False, "the straight way back from the object is blocked")
+        done = execute(context, along_line(context, back, CAREFUL))
         away = home_again(context, models)
         return Outcome(True, "backed off" + (", and went home" if away else ""), margins=facts(done))
 

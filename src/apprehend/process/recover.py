@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import planning
-from .choose import STANDOFF, Models, approach_axis, shift
+from .choose import Models, withdraw
 from .context import Context
 from .motion import CAREFUL, along_line, execute
 
@@ -18,10 +17,8 @@ def back_off(context: Context) -> None:
     context.held, context.slip, context.dropped, context.arm.load = None, 0.0, False, None
     context.gripper.move(world, choice.candidate.opening)
     world.run(OPEN_TIME, context.arm, context.gripper, until=lambda w: context.gripper.state.name == "ARRIVED")
-    q = context.q
-    pose = context.robot.fk(q, context.hand.root) @ shift(-STANDOFF * approach_axis(choice.candidate))
     models = Models(context, np.asarray(world.body_pose(context.name)))
-    back = planning.straight(context.robot, models.open, q, context.hand.root, pose)
-    if back.success:
-        execute(context, along_line(context, back.path, CAREFUL))
+    back = withdraw(context, models.open, choice.candidate)
+    if back is not None:
+        execute(context, along_line(context, back, CAREFUL))
     context.tried.add(choice.index)
