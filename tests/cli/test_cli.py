@@ -74,6 +74,14 @@ def test_picking_a_mesh_writes_the_episode_and_the_report(tmp_path: Path) -> Non
     assert "https://" not in report
 
 
+def test_a_mesh_with_a_hole_is_repaired_and_the_repair_is_told(tmp_path: Path) -> None:
+    (tmp_path / "holed.obj").write_text(CUBE.rsplit("\n", 1)[0])
+    result = run("pick", "holed.obj", "--mass", "0.1", "--seed", "1", cwd=tmp_path)
+    assert result.returncode == 0, result.stdout + result.stderr
+    told = [line for line in result.stdout.splitlines() if line.startswith("repaired") and "holed" in line]
+    assert told
+
+
 NAN = CUBE.replace("v 0 0 0.04", "v 0 nan 0.04")
 BIG = "\n".join(
     "v " + " ".join(str(float(x) * 2250) for x in line.split()[1:]) if line.startswith("v") else line

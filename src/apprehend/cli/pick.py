@@ -122,6 +122,9 @@ def summarise(episode: Episode, wall: float, saved: dict[str, str] | None) -> No
             table.add_row(f"[dim]{label}[/]", f"{value:.{digits}f} {unit}")
     simulated = sum(s.simulated for s in episode.steps)
     table.add_row("[dim]time[/]", f"{wall:.1f} s for {simulated:.1f} s of motion")
+    for kind, notes in (("repaired", episode.inputs["repairs"]), ("assumed", episode.inputs["assumptions"])):
+        for note in notes:
+            table.add_row(f"[dim]{kind}[/]", note)
     for label, path in (saved or {}).items():
         table.add_row(f"[dim]{label}[/]", path)
     console.print(table)

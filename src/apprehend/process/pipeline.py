@@ -118,7 +118,7 @@ def pick_and_place(
     data, meshes = scene_data(scene)
     return Episode(
         title=f"{scene.robot.name} picks {context.name}",
-        inputs=_inputs(scene, seed),
+        inputs=_inputs(context, seed),
         steps=tuple(records),
         verdict=verdict,
         scene=data,
@@ -135,10 +135,11 @@ def _verdict(context: Context, records: Sequence[StepRecord]) -> Verdict:
     return judge(context)
 
 
-def _inputs(scene: Scene, seed: int) -> dict[str, Any]:
-    source = scene.robot_source
-    body = scene.bodies[scene.pick or ""].body
+def _inputs(context: Context, seed: int) -> dict[str, Any]:
+    scene, body = context.scene, context.body
+    repairs = [str(r) for r in scene.robot.description.repairs] + [f"{body.name}: {r}" for r in body.repairs]
     return {
-        "robot": source.arm, "hand": source.hand, "body": body.name, "mass": body.mass, "friction": body.friction,
-        "scene": scene.source, "seed": seed,
+        "robot": scene.robot_source.arm, "hand": scene.robot_source.hand, "body": body.name, "mass": body.mass,
+        "friction": body.friction, "scene": scene.source, "seed": seed,
+        "repairs": repairs, "assumptions": list(context.world.plant.assumptions),
     }  # fmt: skip
