@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +36,20 @@ class Limits:
 
 
 NO_LIMITS = Limits()
+
+
+def with_torques(limits: Limits | None, torque_limits: ArrayLike, hand_jacobian: ArrayLike | None) -> Limits:
+    """*limits* with the joint torques bounded by *torque_limits* ``(n,)`` either way or ``(n, 2)`` pairs."""
+    limits = limits or NO_LIMITS
+    J = limits.hand_jacobian if hand_jacobian is None else hand_jacobian
+    if J is None:
+        raise InputError("torque_limits need hand_jacobian= the matrix J_H (m, n) that maps contact forces to torques")
+    bounds = as_array(torque_limits, "torque_limits", finite=False)
+    if bounds.ndim == 2 and bounds.shape[1] == 2:
+        return replace(limits, hand_jacobian=J, torque_lower=bounds[:, 0], torque_upper=bounds[:, 1])
+    if bounds.ndim > 1:
+        raise InputError(f"torque_limits has shape {bounds.shape}; expected (n,) or (n, 2)")
+    return replace(limits, hand_jacobian=J, torque_lower=-bounds, torque_upper=bounds)
 
 
 @dataclass

@@ -15,7 +15,7 @@ from ..errors import InputError
 from .ball import Generators
 from .closure import Closure, force_closure, form_closure
 from .contact import Contact, ContactModel
-from .force_program import Limits
+from .force_program import Limits, with_torques
 from .forces import ContactForces, ForceBatch, contact_forces
 from .program import ContactCone, contact_cone
 from .push import Push, largest_force
@@ -243,9 +243,22 @@ class Grasp:
         return measure(self, kind, **options)
 
     def contact_forces(
-        self, wrench: ArrayLike, objective: str = "min_normal", limits: Limits | None = None, **options: Any
+        self,
+        wrench: ArrayLike,
+        objective: str = "min_normal",
+        limits: Limits | None = None,
+        *,
+        torque_limits: ArrayLike | None = None,
+        hand_jacobian: ArrayLike | None = None,
+        **options: Any,
     ) -> ContactForces | ForceBatch:
-        """Contact forces that balance an external wrench: see `forces.contact_forces`."""
+        """Contact forces that balance an external wrench: see `forces.contact_forces`.
+
+        *torque_limits*: largest joint torques ``(n,)`` either way, or pairs of lowest and highest ``(n, 2)``, in N m,
+        with *hand_jacobian* J_H ``(m, n)`` (`hand_jacobian`): ``lower ≤ J_Hᵗ f ≤ upper``.
+        """
+        if torque_limits is not None:
+            limits = with_torques(limits, torque_limits, hand_jacobian)
         return contact_forces(self, wrench, objective, limits, **options)
 
     def largest_force(self, direction: ArrayLike, limits: Limits, **options: Any) -> Push:

@@ -77,6 +77,10 @@ class Timing(Result):
         self.require_success()
         return composed(self.path, self.t, self.timing)
 
+    def __call__(self, t: ArrayLike, order: int = 0) -> Array:
+        """The motion itself, ``motion(t, order)``: position, velocity, … at times ``t (...)``; see `Trajectory`."""
+        return self.motion(t, order)
+
     @cached_property
     def report(self) -> LimitReport:
         """The proof that velocity and acceleration keep their limits at all times, with the largest excess."""
