@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-from .rays import DEPTH, _nearest_on_triangle
+from .rays import DEPTH, _nearest_on_triangle, push_nearer_last
 
 
 @kernel
@@ -91,18 +91,7 @@ def nearest_facing(tree, points, toward, out, distance):  # type: ignore[no-unty
             node = stack[top]
             first = tree.children[node, 0]
             if first >= 0:
-                a, b = first, tree.children[node, 1]
-                da, db = 0.0, 0.0
-                for k in range(3):
-                    e = max(tree.boxes[a, k] - p[k], p[k] - tree.boxes[a, k + 3], 0.0)
-                    da += e * e
-                    e = max(tree.boxes[b, k] - p[k], p[k] - tree.boxes[b, k + 3], 0.0)
-                    db += e * e
-                if da < db:
-                    a, b, da, db = b, a, db, da
-                stack[top], lower[top] = a, da
-                stack[top + 1], lower[top + 1] = b, db
-                top += 2
+                top = push_nearer_last(tree, node, p, stack, lower, top)
                 continue
             first = -first - 1
             for i in range(first, first + tree.children[node, 1]):

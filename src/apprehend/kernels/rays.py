@@ -272,6 +272,23 @@ def _nearest_on_triangle(p, tri, out):  # type: ignore[no-untyped-def]
     return squared
 
 
+@kernel
+def push_nearer_last(tree, node, p, stack, lower, top):
+    """Put both children of an inner *node* on the stack with their squared distances from p, the nearer on top."""
+    a, b = tree.children[node, 0], tree.children[node, 1]
+    da, db = 0.0, 0.0
+    for k in range(3):
+        e = max(tree.boxes[a, k] - p[k], p[k] - tree.boxes[a, k + 3], 0.0)
+        da += e * e
+        e = max(tree.boxes[b, k] - p[k], p[k] - tree.boxes[b, k + 3], 0.0)
+        db += e * e
+    if da < db:
+        a, b, da, db = b, a, db, da
+    stack[top], lower[top] = a, da
+    stack[top + 1], lower[top + 1] = b, db
+    return top + 2
+
+
 @kernel(fast=False)
 def nearest(tree, points, out, distance, faces):  # type: ignore[no-untyped-def]
     """Closest point of the surface to each point, its distance and its face."""
@@ -290,18 +307,7 @@ def nearest(tree, points, out, distance, faces):  # type: ignore[no-untyped-def]
             node = stack[top]
             first = tree.children[node, 0]
             if first >= 0:
-                a, b = first, tree.children[node, 1]
-                da, db = 0.0, 0.0
-                for k in range(3):
-                    e = max(tree.boxes[a, k] - p[k], p[k] - tree.boxes[a, k + 3], 0.0)
-                    da += e * e
-                    e = max(tree.boxes[b, k] - p[k], p[k] - tree.boxes[b, k + 3], 0.0)
-                    db += e * e
-                if da < db:
-                    a, b, da, db = b, a, db, da
-                stack[top], lower[top] = a, da
-                stack[top + 1], lower[top + 1] = b, db
-                top += 2
+                top = push_nearer_last(tree, node, p, stack, lower, top)
                 continue
             first = -first - 1
             for i in range(first, first + tree.children[node, 1]):

@@ -31,14 +31,14 @@ POSTURES = 6
 class Choice:
     """A grasp with the straight joint paths around it, each ``(m, n)``, first point to last.
 
-    *approach*: standoff to grasp, open; *lift*: grasp upwards; *retreat*: from the place backwards, open.
+    *approach*: standoff to grasp, open; *lift*: grasp upwards. That there is a way down to the place and back from it
+    was checked; those paths are made anew from how the object is then held.
     """
 
     index: int
     candidate: Candidate
     approach: Array
     lift: Array
-    retreat: Array
 
 
 class Models:
@@ -131,7 +131,7 @@ def _feasible(context: Context, models: Models, index: int, postures: Array) -> 
         if away is None:
             furthest = "the retreat is blocked"
             continue
-        return Choice(index, candidate, back[::-1], up, away)
+        return Choice(index, candidate, back[::-1], up)
     return furthest
 
 
