@@ -2,6 +2,7 @@
 
 from .context import Context
 from .episode import Episode, EpisodeStatus, StepRecord, StepStatus, Verdict, read_episode
+from .fine import Refine
 from .locate import Locate, LocateByState
 from .pipeline import Process, pick_and_place
 from .shuffle import shuffled
@@ -16,6 +17,7 @@ __all__ = [
     "Observer",
     "Outcome",
     "Process",
+    "Refine",
     "Step",
     "StepRecord",
     "StepStatus",

@@ -92,14 +92,14 @@ def choose(context: Context) -> tuple[Choice | None, Counter[str]]:
         if not found.found[k]:
             reasons["out of reach"] += 1
             continue
-        outcome = _feasible(context, models, i, found.solutions(k))
+        outcome = feasible(context, models, i, found.solutions(k))
         if isinstance(outcome, Choice):
             return outcome, reasons
         reasons[outcome] += 1
     return None, reasons
 
 
-def _feasible(context: Context, models: Models, index: int, postures: Array) -> Choice | str:
+def feasible(context: Context, models: Models, index: int, postures: Array) -> Choice | str:
     """The grasp with its paths, or the first stage at which the most promising posture failed."""
     candidate: Candidate = context.plan.candidates[index]  # type: ignore[union-attr]
     open_ = context.with_fingers(postures, candidate.opening)

@@ -27,9 +27,10 @@ RECORDING_RATE = 60.0
 class Context:
     """One run: the scene as described, the world as simulated, and what the steps found out so far.
 
-    *pose* is the located pose T_world_body; *plan* the ranked grasps, for the supporting *planes* (k, 4); *choice* the
-    grasp being carried out with its arm postures; *tried* the grasps that failed; *held* the pose of the body in the
-    hand, T_hand_body, once lifted.
+    *pose* is the located pose T_world_body and *covariance* (6, 6) that of the translation of its centre of mass and
+    of its rotation vector, in world axes, None where the pose is exact; *plan* the ranked grasps, for the supporting
+    *planes* (k, 4); *choice* the grasp being carried out with its arm postures; *tried* the grasps that failed;
+    *held* the pose of the body in the hand, T_hand_body, once lifted.
     """
 
     scene: Scene
@@ -40,6 +41,7 @@ class Context:
     arm: JointController
     gripper: Gripper
     pose: Array | None = None
+    covariance: Array | None = None
     plan: GraspPlan | None = None
     choice: Choice | None = None
     held: Array | None = None

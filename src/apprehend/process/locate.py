@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -37,13 +37,16 @@ class Locate:
     """Let the scene come to rest, and find the object in noisy depth images of two fixed cameras (perception room).
 
     The described pose says where to look and which of several equivalent poses of a symmetric object is meant; where
-    it does not fit what is seen, the whole region around it is searched without it.
+    it does not fit what is seen, the whole region around it is searched without it. *calibration* are the standard
+    deviations in m and rad, per axis, of the error with which the robot knows where the two cameras stand (one error
+    for both, about the described place): what the look of the hand camera takes out again.
     """
 
     name: str = "locate"
     title: str = "Locate the object"
     camera: Camera = field(default_factory=lambda: Camera.from_fov(320, 240))
     noise: Noise = field(default_factory=Noise)
+    calibration: tuple[float, float] = (0.0, 0.0)
 
     def run(self, context: Context) -> Outcome:
         """Settle, look, find; the simulator's true pose serves to state the error, and nothing else."""
@@ -52,8 +55,14 @@ class Locate:
             return settled
         described = context.scene.bodies[context.name].pose
         centre = described[:3, :3] @ context.body.com + described[:3, 3]
-        views = [look(context.world, self.camera, pose, noise=self.noise).image for pose in viewpoints(context, centre)]
-        plane = Plane(offset=float((context.body.vertices @ described[2, :3] + described[2, 3]).min()))
+        error = self._calibration_error(context.rng, centre)
+        views = [
+            replace(view, pose=error @ view.pose)
+            for view in (
+                look(context.world, self.camera, pose, noise=self.noise).image for pose in viewpoints(context, centre)
+            )
+        ]
+        plane = support(context.body, described)
         region = np.array([centre - SEARCH, centre + SEARCH])
         result = locate(
             views, context.body, plane=plane, rng=context.rng, region=region, guess=described, noise=self.noise
@@ -64,6 +73,7 @@ class Locate:
         if result.status in (LocateStatus.NOT_SEEN, LocateStatus.POOR_FIT):
             return Outcome(False, result.explain())
         context.pose = as_described(context.body, result.pose, described, result.covariance)
+        context.covariance = result.covariance + np.diag(np.repeat(np.square(self.calibration), 3))
         truth = context.world.body_pose(context.name)
         off = float(np.linalg.norm((context.pose - truth) @ np.append(context.body.com, 1.0)))
         x, y, z = context.pose[:3, 3]
@@ -74,6 +84,20 @@ class Locate:
             outputs={"pose": context.pose, "residual": result.residual, "fitness": result.fitness},
             margins={"error": off, "turn": angle(truth[:3, :3].T @ context.pose[:3, :3])},
         )
+
+    def _calibration_error(self, rng: np.random.Generator, centre: Array) -> Array:
+        """A small random motion (4, 4) about *centre*."""
+        out = np.eye(4)
+        if any(self.calibration):
+            shift, turn = rng.standard_normal((2, 3)) * np.array(self.calibration)[:, None]
+            out[:3, :3] = Rotation.exp(turn).matrix
+            out[:3, 3] = centre + shift - out[:3, :3] @ centre
+        return out
+
+
+def support(body: Body, pose: Array) -> Plane:
+    """The horizontal plane under *body* at *pose* (T_world_body)."""
+    return Plane(offset=float((body.vertices @ pose[2, :3] + pose[2, 3]).min()))
 
 
 def as_described(body: Body, pose: Array, described: Array, covariance: Array) -> Array:

@@ -14,6 +14,7 @@ from ..errors import InputError, unknown_name
 from .context import Context
 from .episode import Episode, EpisodeStatus, StepRecord, StepStatus, Verdict
 from .export import recording_data, scene_data
+from .fine import Refine
 from .grasping import Close, PlanGrasp, Preshape, Rate
 from .judge import judge
 from .locate import Locate
@@ -39,7 +40,7 @@ class Process:
         """G 4's decomposition, from locating the object to letting go of it."""
         return cls(
             (
-                Locate(), PlanGrasp(), Reach(), Preshape(), Approach(), Close(), Lift(), Rate(),
+                Locate(), PlanGrasp(), Reach(), Preshape(), Refine(), Approach(), Close(), Lift(), Rate(),
                 Transport(), Place(), Release(), Retreat(),
             )
         )  # fmt: skip

@@ -79,7 +79,7 @@ def look(
     return View(image, owner.astype(np.int64), world.plant.owners)
 
 
-def hand_camera(world: World, root: str, tcp: Array, *, back: float = 0.06, side: float = 0.07) -> Array:
+def hand_camera(world: World, root: str, tcp: Array, *, back: float = 0.0, side: float = 0.07) -> Array:
     """T_root_camera of a camera on the hand with base link *root*, beside the palm, that looks at the tcp.
 
     *tcp* is T_root_tcp; the camera sits *side* m off along the tcp's y, *back* m behind the hand's root.
