@@ -18,6 +18,7 @@ from . import rest
 from .convex import ConvexParts, Piece, decompose
 from .load import check_mesh, read_mesh
 from .mass import Solid, check_inertia, solid
+from .queries import Queries
 from .repair import Mended, mend, union
 from .rest import RestPose
 
@@ -31,7 +32,7 @@ side has facets. At 0.3 kg it is an energy of 1 mJ."""
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class Body(Queries):
     """A rigid body. Everything is in the coordinates of its mesh file, in SI units; make one with `Body.load`.
 
     The centre of mass and the inertia are those of the solid of even density that the surface encloses, unless given.
