@@ -100,7 +100,7 @@ class Refine:
 
 
 def uncertainty(covariance: Array) -> Array:
-    """What one image's *covariance* (6, 6) is taken for: larger by `TRUST`, boundless about axes that it leaves open."""
+    """What an image's *covariance* (6, 6) is taken for: `TRUST`² times it, and boundless about axes it leaves open."""
     out = TRUST**2 * covariance
     variance, axes = np.linalg.eigh(out[3:, 3:])
     for axis in axes.T[variance > OPEN**2]:
