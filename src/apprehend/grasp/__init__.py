@@ -1,7 +1,8 @@
 """Grasps: contacts, closure and quality, contact forces, and planning on meshes."""
 
 from .candidates import Candidate, GraspPlan, PlanStatus
-from .closure import Closure, ClosureStatus, closed
+from .closure import Closure, ClosureStatus
+from .closures import Closures, closed, force_closures
 from .contact import Contact, ContactModel
 from .files import read_grasp
 from .force_program import Limits
@@ -15,7 +16,27 @@ from .quality import Quality
 from .surface import Surface
 
 __all__ = [
-    "Candidate", "Closure", "ClosureStatus", "Contact", "ContactForces", "ContactModel", "ForceBatch", "ForceStatus",
-    "Grasp", "GraspPlan", "HandGrasp", "Limits", "PlanStatus", "Push", "Quality", "Surface", "closed", "hand_jacobian",
-    "plan", "read_grasp", "save_picture",
-]  # fmt: skip
+    "Candidate",
+    "Closure",
+    "ClosureStatus",
+    "Closures",
+    "Contact",
+    "ContactForces",
+    "ContactModel",
+    "ForceBatch",
+    "ForceStatus",
+    "Grasp",
+    "GraspPlan",
+    "HandGrasp",
+    "Limits",
+    "PlanStatus",
+    "Push",
+    "Quality",
+    "Surface",
+    "closed",
+    "force_closures",
+    "hand_jacobian",
+    "plan",
+    "read_grasp",
+    "save_picture",
+]

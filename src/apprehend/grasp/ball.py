@@ -70,21 +70,17 @@ def largest(
     return Ball(lower, upper, worst, int(outcome), float(answer[3]), float(answer[4]), int(answer[2]))
 
 
-def inside(base: Array, spread: Array, box: BoolArray) -> tuple[BoolArray, Array]:
-    """For N grasps of k contacts: is the origin strictly inside the hull of the cone bases, and a separating direction.
+def separated(base: Array, spread: Array, box: BoolArray) -> tuple[BoolArray, Array]:
+    """For N grasps of k contacts: whether a direction was found along which none can push, and the direction.
 
-    ``base (N, k, d)``, ``spread (N, k, 3, d)``, ``box (N, k)``. The direction ``(N, d)`` is zero for sets that do not
-    span the space.
+    ``base (N, k, d)``, ``spread (N, k, 3, d)``, ``box (N, k)``; the cone bases reach at most 2e-9 of their size along
+    the direction ``(N, d)`` (Farkas). Sets that do not span the space are left out.
     """
     n, d = base.shape[0], base.shape[2]
     verdict, worst = np.empty(n, np.int64), np.empty((n, d))
 
     def work(i: int, j: int) -> None:
-        hull.closed(base[i:j], spread[i:j], box[i:j], *_work(d, 512, 512), verdict[i:j], worst[i:j])
+        hull.separate(base[i:j], spread[i:j], box[i:j], *_work(d, 512, 512), verdict[i:j], worst[i:j])
 
     over_ranges(work, n, 64)
-    for i in np.nonzero(verdict == hull.FULL)[0]:  # borderline: more room
-        one = largest(hull.BASES, Generators(base[i], spread[i], box[i]), tolerance=1.0 - 1e-9)
-        safe = one.lower > 1e-9 * float(np.linalg.norm(base[i], axis=1).max())
-        verdict[i], worst[i] = one.outcome if safe or one.outcome != hull.CLOSED else hull.OUTSIDE, one.worst
-    return verdict == hull.CLOSED, worst
+    return verdict == hull.OUTSIDE, worst

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import Array, BoolArray
+from ..arrays import Array
 from ..kernels import hull
 from ..result import Result, Status
-from .ball import Generators, largest
+from .ball import largest
 from .contact import Contact, ContactModel
 from .program import solve
 
@@ -164,18 +163,3 @@ def form_closure(grasp: Grasp) -> Closure:
         length=grasp.length,
     )
     return force_closure(bare)
-
-
-def closed(grasps: Sequence[Grasp]) -> BoolArray:
-    """Force closure of many grasps with equally many contacts of one dimension: booleans ``(N,)``.
-
-    Decided by whether the origin is inside the convex hull of the exact cones (`kernels.hull`), many times faster than
-    one program each; no proofs are kept.
-    """
-    from .ball import inside
-
-    parts = [g.generators for g in grasps]
-    stacked = Generators(
-        np.stack([p.base for p in parts]), np.stack([p.spread for p in parts]), np.stack([p.box for p in parts])
-    )
-    return inside(*stacked)[0]

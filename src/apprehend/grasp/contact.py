@@ -59,14 +59,8 @@ class Contact:
         if abs(length - 1.0) > 1e-6:
             remedy = "a normal needs a direction" if length == 0.0 else "divide it by its length"
             raise InputError(f"contact normal {n.tolist()} has length {length:.6g}; expected 1: {remedy}")
-        try:
-            model = ContactModel(self.model)
-        except ValueError:
-            allowed = ", ".join(repr(m.value) for m in ContactModel)
-            raise InputError(f"contact model is {self.model!r}; expected one of {allowed}") from None
-        for label, value in (("friction", self.friction), ("torsion", self.torsion)):
-            if not (np.isfinite(value) and value >= 0.0):
-                raise InputError(f"contact {label} is {value}; expected a finite number, zero or more")
+        model = model_of(self.model)
+        check_numbers(friction=self.friction, torsion=self.torsion)
         if model in (ContactModel.SOFT, ContactModel.SOFT_BOX) and len(p) == 2:
             raise InputError(f"contact model {model.value!r} has no meaning in the plane; use 'coulomb'")
         object.__setattr__(self, "position", p)
@@ -177,6 +171,27 @@ class Contact:
         d = as_array(direction, "direction")
         cosine = float(self.normal @ d / np.linalg.norm(d))
         return float(np.arctan(self.friction) - np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def model_of(model: ContactModel | str) -> ContactModel:
+    """The contact model of that name, or `InputError` that lists them."""
+    try:
+        return ContactModel(model)
+    except ValueError:
+        allowed = ", ".join(repr(m.value) for m in ContactModel)
+        raise InputError(f"contact model is {model!r}; expected one of {allowed}") from None
+
+
+def check_numbers(**values: ArrayLike) -> None:
+    """Raise `InputError` for a coefficient of contacts that is negative or not finite."""
+    for label, value in values.items():
+        given = np.asarray(value, dtype=np.float64)
+        bad = np.argwhere(~(np.isfinite(given) & (given >= 0.0)))
+        if len(bad):
+            at = tuple(int(i) for i in bad[0])
+            raise InputError(
+                f"contact {label}{list(at) if at else ''} is {float(given[at])}; expected a finite number, zero or more"
+            )
 
 
 def _over(value: Array, limit: float) -> Array:

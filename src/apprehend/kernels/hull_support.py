@@ -6,9 +6,11 @@ import numpy as np
 
 from ._jit import kernel
 
-POINTS, UNION, SUM, BASES = 0, 1, 2, 3
+POINTS, UNION, SUM, BASES, GROUPS, CAP_UNION, CAP_SUM = 0, 1, 2, 3, 4, 5, 6
 """Kinds of sets: hull of points (rows of *base*); hull of the union of cone bases and the origin (L1); sum of those
-(L∞); hull of the cone bases alone."""
+(L∞); hull of the cone bases alone; sum of hulls of groups of points, the origin added to each (*box* marks the first
+row of a group); union and sum of caps: forces in the cone of length at most one. Of a cap, *base* is the wrench of the
+unit normal force, ``spread[0]`` and ``spread[1]`` those of unit tangential forces, and ``spread[2, 0]`` is µ."""
 
 
 @kernel
@@ -42,6 +44,10 @@ def _support(kind, base, spread, box, u, out):  # type: ignore[no-untyped-def]
         return best
     for j in range(d):
         out[j] = 0.0
+    if kind == GROUPS:
+        return _support_groups(base, box, u, out)
+    if kind >= CAP_UNION:
+        return _support_caps(kind == CAP_SUM, base, spread, u, out)
     for i in range(base.shape[0]):
         v, s0, s1, s2 = 0.0, 0.0, 0.0, 0.0
         for j in range(d):
@@ -69,6 +75,56 @@ def _support(kind, base, spread, box, u, out):  # type: ignore[no-untyped-def]
         s2 += spread[chosen, 2, j] * u[j]
     _reach(base[chosen], spread[chosen], box[chosen], s0, s1, s2, out)
     return best
+
+
+@kernel
+def _support_groups(base, first, u, out):  # type: ignore[no-untyped-def]
+    d, count = u.shape[0], base.shape[0]
+    total, best, chosen = 0.0, 0.0, -1
+    for i in range(count + 1):
+        if i == count or first[i]:
+            if chosen >= 0:
+                total += best
+                for j in range(d):
+                    out[j] += base[chosen, j]
+            best, chosen = 0.0, -1
+            if i == count:
+                break
+        v = 0.0
+        for j in range(d):
+            v += base[i, j] * u[j]
+        if v > best:
+            best, chosen = v, i
+    return total
+
+
+@kernel
+def _support_caps(add, base, spread, u, out):  # type: ignore[no-untyped-def]
+    d = u.shape[0]
+    best, total = 0.0, 0.0
+    for i in range(base.shape[0]):
+        n, x, y, mu = 0.0, 0.0, 0.0, spread[i, 2, 0]
+        for j in range(d):
+            n += base[i, j] * u[j]
+            x += spread[i, 0, j] * u[j]
+            y += spread[i, 1, j] * u[j]
+        t = np.sqrt(x * x + y * y)
+        if t <= mu * n:  # the direction lies in the cone
+            value = np.sqrt(n * n + t * t)
+            a, b = (n / value, 1.0 / value) if value > 0.0 else (0.0, 0.0)
+        else:  # the nearest edge of the cone
+            a = 1.0 / np.sqrt(1.0 + mu * mu)
+            value, b = a * (n + mu * t), a * mu / t
+        if value <= 0.0 or (not add and value <= best):
+            continue
+        if not add:
+            best = value
+            for j in range(d):
+                out[j] = 0.0
+        total += value
+        for j in range(d):
+            out[j] += a * base[i, j] + b * (x * spread[i, 0, j] + y * spread[i, 1, j])
+    return total if add else best
 
 
 @kernel
