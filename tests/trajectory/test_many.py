@@ -35,8 +35,27 @@ def test_answers_of_single_calls(options: dict) -> None:
             assert many[i].motion.duration == pytest.approx(many.durations[i], rel=1e-12)
 
 
+def test_blocks_with_all_that_can_happen_to_a_lane() -> None:
+    """Two blocks: kinks, standing joints, straight lines, rest in the middle, many sizes, asymmetric limits."""
+    rng = np.random.default_rng(5)
+    limits = tj.Limits(velocity=[[-1.0, 2.0]] * 3, acceleration=[[-3.0, 1.0]] * 3)
+    curves: list[tj.PolynomialPath] = [
+        tj.Spline(rng.normal(size=(5, 3)) * 10.0 ** rng.integers(-4, 4)) for _ in range(70)
+    ]
+    curves[2] = tj.polyline(rng.normal(size=(6, 3)))
+    curves[9] = tj.Spline(rng.normal(size=(5, 3)) * [1.0, 0.0, 1.0])
+    curves[11] = tj.polyline([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    curves[66] = tj.PolynomialPath([0.0, 1.0], [[[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0] * 3, [1.0, 2.0, 3.0]]])
+    many = tj.time_optimal_many(curves, limits, grid=60).require_success()
+    for i, curve in enumerate(curves):
+        single = tj.time_optimal(curve, limits, grid=60)
+        assert many.durations[i] == pytest.approx(single.duration, rel=1e-9), i
+        if i % 10 < 3:
+            assert many[i].motion.check(limits).success
+
+
 def test_threads_do_not_change_the_bits() -> None:
-    curves = paths(64, seed=1)
+    curves = paths(140, seed=1)
     before = parallel.threads()
     try:
         found = []

@@ -279,26 +279,3 @@ def solve_into(
             if x[i] <= 0.0 and x[i + 1] <= 0.0:
                 return STALLED, i
     return status, stage
-
-
-@kernel
-def solve_many(
-    breaks, coefficients, first, grids, vlim, alim, sampled, bounds, binomial, x_start, x_end, start, stop, x, durations
-):
-    """Profiles ``x (P, N + 1)`` and durations (infinite where there is none) of the paths *start* … *stop*.
-
-    ``breaks`` and ``coefficients`` hold all paths one after the other; the pieces of path p begin at ``first[p]``, its
-    breaks p places later, since every path has one break more than pieces.
-    """
-    count = grids.shape[1] - 1
-    size = row_count(coefficients.shape[1] - 1, coefficients.shape[2], 0)
-    rows = np.empty(((count + WIDE - 1) // WIDE, (3 * size + 2) * WIDE))
-    pinned = np.empty(count + 1, dtype=np.bool_)
-    alpha = np.empty(count + 1)
-    beta = np.empty(count + 1)
-    for p in range(start, stop):
-        status, _ = solve_into(
-            breaks[first[p] + p : first[p + 1] + p + 1], coefficients[first[p] : first[p + 1]], grids[p], vlim, alim,
-            sampled, bounds, binomial, x_start, x_end, rows, pinned, alpha, beta, x[p],
-        )  # fmt: skip
-        durations[p] = duration(grids[p], x[p]) if status == OK else np.inf

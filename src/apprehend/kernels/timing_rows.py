@@ -12,12 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-
-WIDE = 64
-"""Lanes of a block. Loops of 16 short steps are unrolled before they can be vectorised; loops of 64 are not."""
-
-MASK = 0x7FFFFFFF
-"""Offsets into lane buffers are masked with it, so that the compiler knows that they are not negative."""
+from .timing_cubic import MASK, WIDE, WORK, cubic_rows, shifted
 
 
 @kernel
@@ -81,8 +76,89 @@ def _place(r, lo, hi, ia, ib, work, size, out):
 
 
 @kernel
+def _square_of_velocity(local, shift, j, degree, n, fast, back, binomial, work):
+    """Bernstein coefficients of ``q'²`` of coordinate j over its limit, joined with the worst of the others.
+
+    Work: two lanes of sign, one of sums, then from 4 on ``q'`` (degree), from 4 + degree on the worst (2 degree − 1).
+    """
+    m = degree - 1
+    a = 0
+    b = WIDE
+    square = 2 * WIDE
+    v = 4 * WIDE
+    top = (4 + degree) * WIDE
+    for lane in range(WIDE):
+        work[a + lane] = 0.0
+        work[b + lane] = 0.0
+    for p in range(degree):
+        weight = (p + 1) / binomial[m, p]
+        to = v + (p * WIDE & MASK)
+        source = ((p + 1) * n + j) * WIDE & MASK
+        for lane in range(WIDE):
+            work[to + lane] = weight * local[source + lane] * shift[2 * WIDE + lane]
+    _accumulate(v, degree, work)
+    for p in range(degree):
+        to = v + (p * WIDE & MASK)
+        for lane in range(WIDE):
+            value = work[to + lane]
+            work[a + lane] = value if value > work[a + lane] else work[a + lane]
+            work[b + lane] = value if value < work[b + lane] else work[b + lane]
+    for lane in range(WIDE):
+        forward = fast if work[a + lane] > 0.0 else 0.0
+        backward = back if work[b + lane] < 0.0 else 0.0
+        work[a + lane] = forward if forward > backward else backward
+    for k in range(2 * m + 1):
+        for lane in range(WIDE):
+            work[square + lane] = 0.0
+        for p in range(max(0, k - m), min(m, k) + 1):
+            weight = binomial[m, p] * binomial[m, k - p] / binomial[2 * m, k]
+            one = v + (p * WIDE & MASK)
+            two = v + ((k - p) * WIDE & MASK)
+            for lane in range(WIDE):
+                work[square + lane] += weight * work[one + lane] * work[two + lane]
+        to = top + (k * WIDE & MASK)
+        for lane in range(WIDE):
+            value = work[square + lane] * work[a + lane]
+            work[to + lane] = value if value > work[to + lane] else work[to + lane]
+
+
+@kernel
+def _accumulate(v, degree, work):
+    """Power to Bernstein coefficients in place, once the powers are divided by their binomials."""
+    for level in range(1, degree):
+        for p in range(degree - 1, level - 1, -1):
+            to = v + (p * WIDE & MASK)
+            before = v + ((p - 1) * WIDE & MASK)
+            for lane in range(WIDE):
+                work[to + lane] += work[before + lane]
+
+
+@kernel
+def _acceleration(local, shift, j, degree, n, binomial, work):
+    """``(q' + 2 σ q'') u + q'' x`` with ``u = (y − x)/2h``, as Bernstein coefficients: b at 4 of *work*, a behind the
+    squares."""
+    m = degree - 1
+    v = 4 * WIDE
+    acc = (4 + degree + 2 * m + 1) * WIDE & MASK
+    for p in range(degree):
+        first = 0.5 * (p + 1.0) / binomial[m, p] + (p + 1.0) * p / binomial[m, p]
+        second = (p + 2.0) * (p + 1.0) / binomial[m, p] if p + 2 <= degree else 0.0
+        source = ((p + 1) * n + j) * WIDE & MASK
+        further = ((p + 2 if p + 2 <= degree else p + 1) * n + j) * WIDE & MASK
+        to = v + (p * WIDE & MASK)
+        other = acc + (p * WIDE & MASK)
+        for lane in range(WIDE):
+            scale = shift[2 * WIDE + lane] * shift[2 * WIDE + lane]
+            half = first * local[source + lane]
+            work[to + lane] = half * scale
+            work[other + lane] = (second * local[further + lane] - half) * scale
+    _accumulate(v, degree, work)
+    _accumulate(acc, degree, work)
+
+
+@kernel
 def velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, work, size, out):
-    """Velocity and acceleration rows of one block.
+    """Velocity and acceleration rows of one block; returns their number.
 
     ``local ((D + 1) n WIDE)``: Taylor coefficients in σ ∈ [0, 1], coefficient p of coordinate j at ``p n + j``;
     ``shift`` as in `load_block`; ``work`` is scratch. Row r of *out* holds slope, low and high at ``3 r`` … ``3 r + 2``; after
@@ -91,7 +167,6 @@ def velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, wo
     m = degree - 1
     a = 0
     b = WIDE
-    square = 2 * WIDE
     v = 4 * WIDE
     top = (4 + degree) * WIDE
     acc = (4 + degree + 2 * m + 1) * WIDE & MASK
@@ -106,67 +181,8 @@ def velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, wo
         fast = 1.0 / (vlim[j, 1] * vlim[j, 1])
         back = 1.0 / (vlim[j, 0] * vlim[j, 0])
         if fast > 0.0 or back > 0.0:
-            for lane in range(WIDE):
-                work[a + lane] = 0.0
-                work[b + lane] = 0.0
-            for p in range(degree):
-                weight = (p + 1) / binomial[m, p]
-                to = v + (p * WIDE & MASK)
-                source = ((p + 1) * n + j) * WIDE & MASK
-                for lane in range(WIDE):
-                    work[to + lane] = weight * local[source + lane] * shift[2 * WIDE + lane]
-            for level in range(1, degree):
-                for p in range(m, level - 1, -1):
-                    to = v + (p * WIDE & MASK)
-                    before = v + ((p - 1) * WIDE & MASK)
-                    for lane in range(WIDE):
-                        work[to + lane] += work[before + lane]
-            for p in range(degree):
-                to = v + (p * WIDE & MASK)
-                for lane in range(WIDE):
-                    value = work[to + lane]
-                    work[a + lane] = value if value > work[a + lane] else work[a + lane]
-                    work[b + lane] = value if value < work[b + lane] else work[b + lane]
-            for lane in range(WIDE):
-                forward = fast if work[a + lane] > 0.0 else 0.0
-                backward = back if work[b + lane] < 0.0 else 0.0
-                work[a + lane] = forward if forward > backward else backward
-            for k in range(2 * m + 1):
-                for lane in range(WIDE):
-                    work[square + lane] = 0.0
-                for p in range(max(0, k - m), min(m, k) + 1):
-                    weight = binomial[m, p] * binomial[m, k - p] / binomial[2 * m, k]
-                    one = v + (p * WIDE & MASK)
-                    two = v + ((k - p) * WIDE & MASK)
-                    for lane in range(WIDE):
-                        work[square + lane] += weight * work[one + lane] * work[two + lane]
-                to = top + (k * WIDE & MASK)
-                for lane in range(WIDE):
-                    value = work[square + lane] * work[a + lane]
-                    work[to + lane] = value if value > work[to + lane] else work[to + lane]
-        # acceleration: (q' + 2 σ q'') u + q'' x with u = (y − x)/2h, as Bernstein coefficients a x + b y
-        for p in range(degree):
-            first = 0.5 * (p + 1.0) / binomial[m, p] + (p + 1.0) * p / binomial[m, p]
-            second = (p + 2.0) * (p + 1.0) / binomial[m, p] if p + 2 <= degree else 0.0
-            source = ((p + 1) * n + j) * WIDE & MASK
-            further = ((p + 2 if p + 2 <= degree else p + 1) * n + j) * WIDE & MASK
-            to = v + (p * WIDE & MASK)
-            other = acc + (p * WIDE & MASK)
-            for lane in range(WIDE):
-                scale = shift[2 * WIDE + lane] * shift[2 * WIDE + lane]
-                half = first * local[source + lane]
-                work[to + lane] = half * scale
-                work[other + lane] = (second * local[further + lane] - half) * scale
-        for level in range(1, degree):
-            for p in range(m, level - 1, -1):
-                to = v + (p * WIDE & MASK)
-                before = v + ((p - 1) * WIDE & MASK)
-                for lane in range(WIDE):
-                    work[to + lane] += work[before + lane]
-                to = acc + (p * WIDE & MASK)
-                before = acc + ((p - 1) * WIDE & MASK)
-                for lane in range(WIDE):
-                    work[to + lane] += work[before + lane]
+            _square_of_velocity(local, shift, j, degree, n, fast, back, binomial, work)
+        _acceleration(local, shift, j, degree, n, binomial, work)
         for p in range(degree):
             _place(r, alim[j, 0], alim[j, 1], acc + (p * WIDE & MASK), v + (p * WIDE & MASK), work, size, out)
             r += 1
@@ -257,9 +273,10 @@ def rows_along(breaks, coefficients, grid, vlim, alim, sampled, bounds, binomial
     count = grid.shape[0] - 1
     size = row_count(degree, n, sampled.shape[2])
     local = np.zeros((degree + 1) * n * WIDE)
+    c = np.empty(3 * n * WIDE)
     shift = np.empty(3 * WIDE)
     piece = np.empty(WIDE, dtype=np.int64)
-    work = np.empty(work_size(degree) * WIDE)
+    work = np.empty(max(work_size(degree), WORK) * WIDE)
     k = 0
     for block in range(out.shape[0]):
         for lane in range(WIDE):
@@ -270,8 +287,17 @@ def rows_along(breaks, coefficients, grid, vlim, alim, sampled, bounds, binomial
             shift[lane] = grid[i] - breaks[k]
             shift[WIDE + lane] = grid[i + 1] - grid[i]
             shift[2 * WIDE + lane] = 1.0 / (grid[i + 1] - grid[i])
-        load_block(coefficients, piece, shift, local)
-        r = velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, work, size, out[block])
+        if degree == 3:
+            for p in range(3):
+                for j in range(n):
+                    to = (p * n + j) * WIDE & MASK
+                    for lane in range(WIDE):
+                        c[to + lane] = coefficients[piece[lane], p + 1, j]
+            shifted(c, shift, n, local)
+            r = cubic_rows(local, shift[WIDE : 2 * WIDE], n, vlim, alim, work, size, out[block])
+        else:
+            load_block(coefficients, piece, shift, local)
+            r = velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, work, size, out[block])
         if sampled.shape[2] > 0:
             for lane in range(WIDE):
                 i = min(block * WIDE + lane, count - 1)

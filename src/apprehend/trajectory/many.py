@@ -1,17 +1,18 @@
-"""Time-optimal timing of many paths in one call: intervals on lanes, paths over the threads."""
+"""Time-optimal timing of many paths in one call: paths on lanes, blocks of paths over the threads."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, BoolArray
+from ..arrays import Array, BoolArray, IntArray
 from ..errors import InputError, UnsuccessfulError
-from ..kernels import timing as kernels
+from ..kernels import timing_lanes as kernels
+from ..kernels.timing_cubic import WIDE
 from ..parallel import over_ranges
 from ..result import Result
 from .limits import Limits
@@ -23,25 +24,45 @@ from .timing import (
     Timing,
     TimingStatus,
     binomials,
-    make_grid,
     profile_timing,
     time_optimal,
 )
 
 
 @dataclass(frozen=True, eq=False)
+class _Group:
+    """Profiles of paths on grids of one size: ``grids``, ``x`` ``(P, N + 1)``, ``durations (P,)``."""
+
+    grids: Array
+    x: Array
+    durations: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Timings(Result):
-    """Answer of `time_optimal_many`: one `Timing` per path, by index; ``durations (P,)`` are infinite for failures."""
+    """Answer of `time_optimal_many`: one `Timing` per path, by index; ``durations (P,)`` are infinite for failures.
+
+    A `Timing` is made from the profiles when it is asked for.
+    """
 
     durations: Array
-    _timings: tuple[Timing | tuple[PolynomialPath, Limits, Array, Array], ...]
+    _paths: tuple[PolynomialPath, ...]
+    _limits: Limits
+    _profiles: tuple[_Group, ...]
+    _place: IntArray
+    """Group and row of every path ``(P, 2)``; a group of −1: among the single ones."""
+    _single: dict[int, Timing]
 
     def __len__(self) -> int:
-        return len(self._timings)
+        return len(self._paths)
 
     def __getitem__(self, i: int) -> Timing:
-        found = self._timings[i]
-        return found if isinstance(found, Timing) else profile_timing(*found)
+        i = range(len(self))[i]
+        if i in self._single:
+            return self._single[i]
+        group, row = self._place[i]
+        profiles = self._profiles[group]
+        return profile_timing(self._paths[i], self._limits, profiles.grids[row], profiles.x[row])
 
     @property
     def success(self) -> BoolArray:  # type: ignore[override]
@@ -51,7 +72,8 @@ class Timings(Result):
     @property
     def status(self) -> tuple[TimingStatus, ...]:  # type: ignore[override]
         """One status per path."""
-        return tuple(t.status if isinstance(t, Timing) else TimingStatus.SUCCESS for t in self._timings)
+        single = self._single
+        return tuple(single[i].status if i in single else TimingStatus.SUCCESS for i in range(len(self)))
 
     def explain(self) -> str:
         """How many succeeded, and the reason of the first that did not."""
@@ -71,11 +93,11 @@ def time_optimal_many(
 ) -> Timings:
     """`time_optimal` of every one of *paths*, which share the number of coordinates and the *limits*.
 
-    The answers are those of single calls with the same *options*. Without further constraints all paths are solved in
-    one call, spread over the threads, and each `Timing` is made when it is asked for; paths with constraints, and those
-    that fail, are solved one by one.
+    The answers are those of single calls with the same *options*. Paths of degree up to three without further
+    constraints are solved side by side on lanes, several times faster than one by one; the others, and those that
+    fail, one by one.
     """
-    curves = [as_polynomial(p) for p in paths]
+    curves = tuple(as_polynomial(p) for p in paths)
     if not curves:
         raise InputError("paths is empty; time_optimal_many needs at least one path")
     n = curves[0].n
@@ -83,47 +105,54 @@ def time_optimal_many(
         if curve.n != n:
             raise InputError(f"path {i} has {curve.n} coordinates and path 0 has {n}; they must agree")
     limits = Limits.read(limits)
-    found: list[Timing | tuple[PolynomialPath, Limits, Array, Array] | None] = [None] * len(curves)
-    durations = np.empty(len(curves))
-    simple = isinstance(grid, (int, np.integer)) and not (set(options) - {"least", "start_speed", "end_speed"})
+    durations, place = np.full(len(curves), np.inf), np.full((len(curves), 2), -1)
+    groups: list[_Group] = []
+    simple = not set(options) - {"least", "start_speed", "end_speed"}
     alim = limits.pairs("acceleration", n)
-    if simple and np.isfinite(alim).all():
+    members = np.array([i for i, c in enumerate(curves) if c.degree <= 3], dtype=np.int64)
+    if simple and isinstance(grid, int) and grid >= 1 and members.size and np.isfinite(alim).all():
         vlim = limits.pairs("velocity", n) * (1.0 - MARGIN)
-        grids = [make_grid(c, grid, int(options.get("least", 1))) for c in curves]
-        groups: dict[tuple[int, int], list[int]] = {}
-        for i, (curve, s) in enumerate(zip(curves, grids)):
-            groups.setdefault((curve.degree, s.size), []).append(i)
-        for members in groups.values():
-            points = np.array([grids[i] for i in members])
-            profiles, times = _together([curves[i] for i in members], points, vlim, alim * (1.0 - MARGIN), options)
-            for k, i in enumerate(members):
-                if times[k] < np.inf:
-                    found[i], durations[i] = (curves[i], limits, points[k], profiles[k]), times[k]
-    answers: list[Timing | tuple[PolynomialPath, Limits, Array, Array]] = []
-    for i, (curve, answer) in enumerate(zip(curves, found)):
-        if answer is None:
-            answer = time_optimal(curve, limits, grid=grid, **options)
-            durations[i] = answer.t[-1] if answer.success else np.inf
-        answers.append(answer)
-    return Timings(durations, tuple(answers))
+        for chosen, group in _on_lanes([curves[i] for i in members], vlim, alim * (1.0 - MARGIN), grid, options):
+            place[members[chosen], 0], place[members[chosen], 1] = len(groups), np.arange(chosen.size)
+            durations[members[chosen]] = group.durations
+            groups.append(group)
+    single = {
+        int(i): time_optimal(curves[i], limits, grid=grid, **options) for i in np.flatnonzero(durations == np.inf)
+    }
+    for i, timing in single.items():
+        durations[i] = timing.t[-1] if timing.success else np.inf
+    return Timings(durations, curves, limits, tuple(groups), place, single)
 
 
-def _together(
-    curves: list[PolynomialPath], grids: Array, vlim: Array, alim: Array, options: dict[str, Any]
-) -> tuple[Array, Array]:
-    """Profiles ``(P, N + 1)`` and durations of curves of one degree on grids of one size, over the threads."""
+def _on_lanes(
+    curves: list[PolynomialPath], vlim: Array, alim: Array, grid: int, options: dict[str, Any]
+) -> Iterator[tuple[IntArray, _Group]]:
+    """Profiles of curves of degree ≤ 3, in groups of those whose grids have one size."""
+    pieces = np.array([c.breaks.size - 1 for c in curves])
+    first = np.concatenate([[0], np.cumsum(pieces)])
     breaks = np.concatenate([c.breaks for c in curves])
-    coefficients = np.concatenate([c.coefficients for c in curves])
-    first = np.concatenate([[0], np.cumsum([c.breaks.size - 1 for c in curves])])
-    x, durations = np.zeros(grids.shape), np.empty(len(curves))
-    table = binomials(2 * curves[0].degree)
+    coefficients = np.concatenate([c.at_least_cubic for c in curves])
+    parts, sizes = np.empty(first[-1], dtype=np.int64), np.empty(len(curves), dtype=np.int64)
+    kernels.shares(breaks, first, grid, int(options.get("least", 1)), parts, sizes)
     x_start, x_end = (float(options.get(name, 0.0)) ** 2 for name in ("start_speed", "end_speed"))
+    table = binomials(6)
+    for size in np.unique(sizes):
+        chosen = np.flatnonzero(sizes == size)
+        if chosen.size < len(curves):
+            own = np.repeat(sizes == size, pieces)
+            ends = np.repeat(sizes == size, pieces + 1)
+            own_first = np.concatenate([[0], np.cumsum(pieces[chosen])])
+            data = breaks[ends], coefficients[own], own_first, parts[own]
+        else:
+            data = breaks, coefficients, first, parts
+        grids, x, durations = (
+            np.empty((chosen.size, size + 1)),
+            np.empty((chosen.size, size + 1)),
+            np.empty(chosen.size),
+        )
 
-    def work(start: int, stop: int) -> None:
-        kernels.solve_many(
-            breaks, coefficients, first, grids, vlim, alim, NO_SAMPLES, NO_BOUNDS, table, x_start, x_end, start, stop,
-            x, durations,
-        )  # fmt: skip
+        def work(start: int, stop: int, data: Any = data, out: Any = (grids, x, durations)) -> None:
+            kernels.solve_many(*data, vlim, alim, NO_SAMPLES, NO_BOUNDS, table, x_start, x_end, start, stop, *out)
 
-    over_ranges(work, len(curves), grain=8)
-    return x, durations
+        over_ranges(work, -(-chosen.size // WIDE))
+        yield chosen, _Group(grids, x, durations)

@@ -39,6 +39,12 @@ class PolynomialPath(Piecewise):
     _variable = "s"
 
     @cached_property
+    def at_least_cubic(self) -> Array:
+        """The coefficients, with zeros up to degree 3."""
+        missing = 4 - self.coefficients.shape[1]
+        return np.pad(self.coefficients, ((0, 0), (0, missing), (0, 0))) if missing > 0 else self.coefficients
+
+    @cached_property
     def smooth(self) -> bool:
         """Whether the path is C² (its curvature does not jump)."""
         return all(

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..kernels import path as path_kernels
 from ..kernels import timing as kernels
 from ..kernels import timing_rows as rows_of
+from ..kernels.timing_cubic import WIDE
 from ..result import Result, Status
 from .constraints import Constraint, PowerLimits
 from .limits import LimitReport, Limits
@@ -165,11 +166,13 @@ class _Problem:
         count = self.grid.size - 1
         x, alpha, beta = np.zeros((3, count + 1))
         values, bounds = (NO_SAMPLES, NO_BOUNDS) if sampled is None else (sampled.values, sampled.bounds)
-        rows = 3 * rows_of.row_count(self.path.degree, self.path.n, values.shape[2]) + 2
-        scratch = np.empty((-(-count // rows_of.WIDE), rows * rows_of.WIDE))
+        coefficients = self.path.at_least_cubic
+        degree = coefficients.shape[1] - 1
+        rows = 3 * rows_of.row_count(degree, self.path.n, values.shape[2]) + 2
+        scratch = np.empty((-(-count // WIDE), rows * WIDE))
         status, stage = kernels.solve_into(
-            self.path.breaks, self.path.coefficients, self.grid, self.vlim, self.alim, values, bounds,
-            binomials(2 * self.path.degree), self.start_speed**2, self.end_speed**2, scratch,
+            self.path.breaks, coefficients, self.grid, self.vlim, self.alim, values, bounds,
+            binomials(2 * degree), self.start_speed**2, self.end_speed**2, scratch,
             np.empty(count + 1, dtype=np.bool_), alpha, beta, x,
         )  # fmt: skip
         if status == kernels.OK:
@@ -248,13 +251,15 @@ def conflict(
     values, bounds = (NO_SAMPLES, NO_BOUNDS) if sampled is None else (
         sampled.values[stage : stage + 1], sampled.bounds[stage : stage + 1]
     )  # fmt: skip
-    rows = int(rows_of.row_count(path.degree, path.n, values.shape[2]))
-    table = np.empty((1, (3 * rows + 2) * rows_of.WIDE))
+    coefficients = path.at_least_cubic
+    degree = coefficients.shape[1] - 1
+    rows = int(rows_of.row_count(degree, path.n, values.shape[2]))
+    table = np.empty((1, (3 * rows + 2) * WIDE))
     rows_of.rows_along(
-        path.breaks, path.coefficients, grid[stage : stage + 2], vlim, alim, values, bounds,
-        binomials(2 * path.degree), table,
+        path.breaks, coefficients, grid[stage : stage + 2], vlim, alim, values, bounds,
+        binomials(2 * degree), table,
     )  # fmt: skip
-    _, low, high = table[0].reshape(-1, rows_of.WIDE)[: 3 * rows, 0].reshape(rows, 3).T
+    _, low, high = table[0].reshape(-1, WIDE)[: 3 * rows, 0].reshape(rows, 3).T
     if sampled is not None:
         still = sampled.values[stage, :, :, 2]
         excess = np.maximum(still - sampled.bounds[stage, :, 1], sampled.bounds[stage, :, 0] - still).max(axis=0)
@@ -262,8 +267,8 @@ def conflict(
         if excess[e] > 0.0:
             value = still[np.abs(still[:, e]).argmax(), e]
             return f"{sampled.names[e]} is {value:.6g} even at rest; the limit is {sampled.bounds[stage, e].tolist()}"
-    names = [f"acceleration of coordinate {j}" for j in range(path.n) for _ in range(path.degree)]
-    names += ["velocity"] * (2 * path.degree - 1)
+    names = [f"acceleration of coordinate {j}" for j in range(path.n) for _ in range(degree)]
+    names += ["velocity"] * (2 * degree - 1)
     names += [name for name in (sampled.names if sampled is not None else ()) for _ in range(4)]
     top, bottom = int(high.argmin()), int(low.argmax())
     upper = names[top] if high[top] < y_high else "the speed that can still be braked further on"
