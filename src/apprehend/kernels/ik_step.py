@@ -7,16 +7,16 @@ its bounds, or whose rows turn out nearly dependent, is then solved by the activ
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ._jit import kernel
 from .chain import load_block
 from .ik_priority import prioritised, priority_work, step_bounds
+from .ik_saturate import MET, saturate, saturate_work
 from .ik_tasks import task_block
 from .lanes import LANES
 from .tree import tree_block
+from .vector import larger, load, magnitude, root, select, smaller, some, splat, store
 
 L = LANES
 REGULAR = 1e-6  # a row whose part in the free space is shorter than this is left to the pivoting method
@@ -27,131 +27,87 @@ def project_rows(J, first, last, N, n, width, A):
     """``A = J N`` for the rows first … last of J, on the first *width* columns of N."""
     for i in range(first, last):
         for c in range(width):
-            out = A[(i * n + c) * L : (i * n + c + 1) * L]
-            out[:] = 0.0
+            s = splat(0.0)
             for k in range(n):
-                x = J[(i * n + k) * L : (i * n + k + 1) * L]
-                y = N[(k * n + c) * L : (k * n + c + 1) * L]
-                for l in range(L):
-                    out[l] += x[l] * y[l]
+                s = s + load(J, (i * n + k) * L) * load(N, (k * n + c) * L)
+            store(A, (i * n + c) * L, s)
 
 
 @kernel
 def normal_equations(A, rest, first, last, n, width, damping, H, z):
-    """``H = AᵀA + damping (L)``, ``z = Aᵀ rest``, then z becomes H⁻¹ z by a Cholesky factorisation, all on lanes."""
+    """``H = AᵀA + damping (L)``, ``z = Aᵀ rest``, then z becomes H⁻¹ z by a Cholesky factorisation, all on lanes.
+
+    H keeps the factor, with reciprocals on its diagonal.
+    """
     for c in range(width):
         for b in range(c + 1):
-            out = H[(c * n + b) * L : (c * n + b + 1) * L]
-            for l in range(L):
-                out[l] = damping[l] if c == b else 0.0
+            s = load(damping, 0) if c == b else splat(0.0)
             for i in range(first, last):
-                x = A[(i * n + c) * L : (i * n + c + 1) * L]
-                y = A[(i * n + b) * L : (i * n + b + 1) * L]
-                for l in range(L):
-                    out[l] += x[l] * y[l]
-        right = z[c * L : (c + 1) * L]
-        right[:] = 0.0
-        for i in range(first, last):
-            x = A[(i * n + c) * L : (i * n + c + 1) * L]
-            y = rest[i * L : (i + 1) * L]
-            for l in range(L):
-                right[l] += x[l] * y[l]
-    for c in range(width):
-        for b in range(c + 1):
-            out = H[(c * n + b) * L : (c * n + b + 1) * L]
+                s = s + load(A, (i * n + c) * L) * load(A, (i * n + b) * L)
             for k in range(b):
-                x = H[(c * n + k) * L : (c * n + k + 1) * L]
-                y = H[(b * n + k) * L : (b * n + k + 1) * L]
-                for l in range(L):
-                    out[l] -= x[l] * y[l]
-            if b == c:
-                for l in range(L):
-                    out[l] = 1.0 / math.sqrt(max(out[l], 1e-300))
-            else:
-                y = H[(b * n + b) * L : (b * n + b + 1) * L]
-                for l in range(L):
-                    out[l] *= y[l]
-    for c in range(width):
-        x = z[c * L : (c + 1) * L]
+                s = s - load(H, (c * n + k) * L) * load(H, (b * n + k) * L)
+            s = 1.0 / root(larger(s, 1e-300)) if b == c else s * load(H, (b * n + b) * L)
+            store(H, (c * n + b) * L, s)
+        s = splat(0.0)
+        for i in range(first, last):
+            s = s + load(A, (i * n + c) * L) * load(rest, i * L)
         for k in range(c):
-            h = H[(c * n + k) * L : (c * n + k + 1) * L]
-            y = z[k * L : (k + 1) * L]
-            for l in range(L):
-                x[l] -= h[l] * y[l]
-        h = H[(c * n + c) * L : (c * n + c + 1) * L]
-        for l in range(L):
-            x[l] *= h[l]
+            s = s - load(H, (c * n + k) * L) * load(z, k * L)
+        store(z, c * L, s * load(H, (c * n + c) * L))
     for c in range(width - 1, -1, -1):
-        x = z[c * L : (c + 1) * L]
+        s = load(z, c * L)
         for k in range(c + 1, width):
-            h = H[(k * n + c) * L : (k * n + c + 1) * L]
-            y = z[k * L : (k + 1) * L]
-            for l in range(L):
-                x[l] -= h[l] * y[l]
-        h = H[(c * n + c) * L : (c * n + c + 1) * L]
-        for l in range(L):
-            x[l] *= h[l]
+            s = s - load(H, (k * n + c) * L) * load(z, k * L)
+        store(z, c * L, s * load(H, (c * n + c) * L))
 
 
 @kernel
-def reflect(u, beta, M, first, last, n, width, dot):
+def reflect(u, beta, M, first, last, n, width):
     """Apply the reflection ``1 − β u uᵀ`` to the rows first … last of M, on its first *width* columns."""
+    b = load(beta, 0)
     for i in range(first, last):
-        dot[:] = 0.0
+        dot = splat(0.0)
         for c in range(width):
-            x = M[(i * n + c) * L : (i * n + c + 1) * L]
-            y = u[c * L : (c + 1) * L]
-            for l in range(L):
-                dot[l] += x[l] * y[l]
-        for l in range(L):
-            dot[l] *= beta[l]
+            dot = dot + load(M, (i * n + c) * L) * load(u, c * L)
+        dot = dot * b
         for c in range(width):
-            x = M[(i * n + c) * L : (i * n + c + 1) * L]
-            y = u[c * L : (c + 1) * L]
-            for l in range(L):
-                x[l] -= dot[l] * y[l]
+            o = (i * n + c) * L
+            store(M, o, load(M, o) - dot * load(u, c * L))
 
 
 @kernel
-def take_rows_out(A, first, last, N, n, width, u, beta, dot, irregular):
+def take_rows_out(A, first, last, N, n, width, u, beta, irregular):
     """Reflect N so that the rows of A (in its basis) have no part in the columns that are left; returns how many."""
     for i in range(first, last):
         if width == 0:
             break
-        beta[:] = 0.0
+        square = splat(0.0)
         for c in range(width):
-            x = A[(i * n + c) * L : (i * n + c + 1) * L]
-            y = u[c * L : (c + 1) * L]
-            for l in range(L):
-                y[l] = x[l]
-                beta[l] += x[l] * x[l]
-        y = u[(width - 1) * L : width * L]
-        for l in range(L):
-            if beta[l] < REGULAR * REGULAR:
-                irregular[l] = 1.0
-                beta[l] = 1.0
-            norm = math.sqrt(beta[l])
-            beta[l] = 1.0 / (norm * (norm + abs(y[l])))
-            y[l] += math.copysign(norm, y[l])
-        reflect(u, beta, N, 0, n, n, width, dot)
-        reflect(u, beta, A, i + 1, last, n, width, dot)
+            x = load(A, (i * n + c) * L)
+            store(u, c * L, x)
+            square = square + x * x
+        short = square < REGULAR * REGULAR
+        store(irregular, 0, select(short, 1.0, load(irregular, 0)))
+        square = select(short, 1.0, square)
+        norm = root(square)
+        end = load(u, (width - 1) * L)
+        store(beta, 0, 1.0 / (square + norm * magnitude(end)))
+        store(u, (width - 1) * L, end + select(end < 0.0, -norm, norm))
+        reflect(u, beta, N, 0, n, n, width)
+        reflect(u, beta, A, i + 1, last, n, width)
         width -= 1
     return width
 
 
 @kernel
-def steps_block(J, e, levels, damping, low, high, n, dq, N, A, H, rest, z, u, irregular):
-    """All levels on lanes, without bounds; ``irregular (L)`` becomes 1 where the result must not be used."""
-    beta, dot = np.empty(L), np.empty(L)
-    damped = np.full(L, damping)
+def steps_block(J, e, levels, damping, low, high, n, dq, N, A, H, rest, z, y, u, work, irregular):
+    """All levels on lanes; ``irregular (L)`` becomes 1 where the result must not be used."""
+    beta, damped = np.empty(L), np.full(L, damping)
     irregular[:] = 0.0
     N[: n * n * L] = 0.0
     for k in range(n):
-        for l in range(L):
-            N[(k * n + k) * L + l] = 1.0
-            dq[k * L + l] = 0.0
-            if low[k * L + l] > 0.0 or high[k * L + l] < 0.0:
-                irregular[l] = 1.0
+        store(N, (k * n + k) * L, splat(1.0))
+        store(dq, k * L, smaller(larger(load(low, k * L), 0.0), load(high, k * L)))
     width = n
     for level in range(levels.shape[0] - 1):
         first, last = levels[level], levels[level + 1]
@@ -159,27 +115,24 @@ def steps_block(J, e, levels, damping, low, high, n, dq, N, A, H, rest, z, u, ir
             break
         project_rows(J, first, last, N, n, width, A)
         for i in range(first, last):
-            r = rest[i * L : (i + 1) * L]
-            for l in range(L):
-                r[l] = e[i * L + l]
+            s = load(e, i * L)
             for k in range(n):
-                x = J[(i * n + k) * L : (i * n + k + 1) * L]
-                y = dq[k * L : (k + 1) * L]
-                for l in range(L):
-                    r[l] -= x[l] * y[l]
+                s = s - load(J, (i * n + k) * L) * load(dq, k * L)
+            store(rest, i * L, s)
         normal_equations(A, rest, first, last, n, width, damped, H, z)
+        passed = splat(0.0)
         for k in range(n):
-            y = dq[k * L : (k + 1) * L]
+            s = load(dq, k * L)
             for c in range(width):
-                x = N[(k * n + c) * L : (k * n + c + 1) * L]
-                v = z[c * L : (c + 1) * L]
-                for l in range(L):
-                    y[l] += x[l] * v[l]
-            for l in range(L):
-                bad = (y[l] < low[k * L + l]) | (y[l] > high[k * L + l])
-                irregular[l] = 1.0 if bad else irregular[l]
+                s = s + load(N, (k * n + c) * L) * load(z, c * L)
+            store(y, k * L, s)
+            passed = larger(passed, larger(s - load(high, k * L), load(low, k * L) - s))
+        if some(passed > MET):
+            saturate(dq, low, high, N, H, z, n, width, y, work, irregular)
+        for k in range(n):
+            store(dq, k * L, smaller(larger(load(y, k * L), load(low, k * L)), load(high, k * L)))
         if level < levels.shape[0] - 2:
-            width = take_rows_out(A, first, last, N, n, width, u, beta, dot, irregular)
+            width = take_rows_out(A, first, last, N, n, width, u, beta, irregular)
 
 
 @kernel
@@ -193,7 +146,8 @@ def steps(
     J, e = np.zeros(rows * n * L), np.zeros(rows * L)
     low, high, dq = np.empty(n * L), np.empty(n * L), np.empty(n * L)
     N, A, H = np.empty(n * n * L), np.empty(rows * n * L), np.empty(n * n * L)
-    rest, z, u, irregular = np.empty(rows * L), np.empty(n * L), np.empty(n * L), np.empty(L)
+    rest, z, y, u, irregular = np.empty(rows * L), np.empty(n * L), np.empty(n * L), np.empty(n * L), np.empty(L)
+    bounds = saturate_work(n)
     work = priority_work(n, rows)
     lo, hi = np.empty(n), np.empty(n)
     J1 = np.empty((rows, n))
@@ -207,7 +161,7 @@ def steps(
             for k in range(n):
                 low[k * L + l] = lo[k]
                 high[k * L + l] = hi[k]
-        steps_block(J, e, levels, damping, low, high, n, dq, N, A, H, rest, z, u, irregular)
+        steps_block(J, e, levels, damping, low, high, n, dq, N, A, H, rest, z, y, u, bounds, irregular)
         for l in range(min(L, last - block)):
             i = block + l
             for r in range(rows):
