@@ -25,10 +25,18 @@ def test_reference_wrench_spaces():
             if row is None or any(c.model is ContactModel.SOFT for c in grasp.contacts):
                 continue
             assert grasp.quality(cone="polyhedral", m=m).value == pytest.approx(row["epsilon"], abs=1e-7)
+            if (length := want["polyhedral"].get(f"L1_unit_force_magnitude_m{m}")) is not None:
+                found = grasp.quality(cone="polyhedral", m=m, bound="magnitude").value
+                assert found == pytest.approx(length["epsilon"], abs=1e-7), case["id"]
             if m < 16:
                 assert grasp.quality("volume", m=m).value == pytest.approx(row["volume"], abs=1e-9)
-        for norm, key in (("l1", "L1"), ("linf", "Linf")):
-            found, bracket = grasp.quality(norm=norm, gap=0.02), want["epsilon_exact_cone"][key]
+        for m in (4, 8):
+            if (row := want["polyhedral"].get(f"Linf_m{m}")) is not None:
+                found = grasp.quality(norm="linf", cone="polyhedral", m=m).value
+                assert found == pytest.approx(row["epsilon"], abs=1e-7), (case["id"], m)
+        kinds = {"L1": {}, "Linf": {"norm": "linf"}, "L1_unit_force_magnitude": {"bound": "magnitude"}}
+        for norm, bracket in want["epsilon_exact_cone"].items():
+            found = grasp.quality(gap=0.02, **kinds[norm])
             assert found.lower <= bracket["upper"] + 1e-9, (case["id"], norm)
             assert found.upper >= bracket["lower"] - 1e-9, (case["id"], norm)
             assert found.upper - found.lower <= 0.02 * found.upper + 1e-9
@@ -163,12 +171,11 @@ def test_simple_measures():
     [
         ("beauty", {}, "kind is 'beauty'"),
         ("epsilon", {"norm": "l2"}, "norm is 'l2'"),
-        ("epsilon", {"cone": "polyhedral", "norm": "linf"}, "exact cones"),
+        ("epsilon", {"gap": 0.0}, "gap is 0.0; expected a share"),
+        ("epsilon", {"bound": "energy"}, "bound is 'energy'"),
         ("epsilon", {"cone": "polyhedral", "m": 2}, "at least 3 edges"),
         ("epsilon", {"subspace": np.ones((2, 6))}, "orthonormal rows"),
-        ("epsilon", {"subspace": np.eye(6)[:1]}, "one row"),
         ("isotropy", {"m": 3}, "takes no options; got m"),
-        ("polygon_area", {}, "this grasp has 4"),
         ("task_ellipsoid", {"sigma": np.zeros((6, 6))}, "positive definite"),
         ("task_ellipsoid", {"sigma": np.eye(5)}, "symmetric matrix"),
         ("task_ellipsoid", {"sigma": np.eye(6), "centre": [1.0]}, "centre has shape"),

@@ -10,6 +10,7 @@ from .forces import ContactForces, ForceBatch, ForceStatus
 from .grasp import Grasp
 from .hand_grasp import HandGrasp, hand_jacobian
 from .jaw_plan import plan
+from .patch import Patch
 from .picture import save_picture
 from .push import Push
 from .quality import Quality
@@ -29,6 +30,7 @@ __all__ = [
     "GraspPlan",
     "HandGrasp",
     "Limits",
+    "Patch",
     "PlanStatus",
     "Push",
     "Quality",

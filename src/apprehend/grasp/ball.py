@@ -17,11 +17,11 @@ ROOMS = (2048, 16384, 131072, 524288)
 
 class Generators(NamedTuple):
     """Cone bases ``axis + Σ s_j half_j`` in d-dimensional wrench space: ``base (k, d)``, ``spread (k, 3, d)``,
-    ``box (k,)`` where the third half-axis is limited on its own."""
+    ``flags (k,)`` of `kernels.hull_support`."""
 
     base: Array
     spread: Array
-    box: BoolArray
+    flags: IntArray
 
 
 class Ball(NamedTuple):
@@ -60,7 +60,7 @@ def largest(
     for room in ROOMS:
         work = _work(d, room, max(room // 4, len(parts.base) + d + 2))
         outcome = hull.grow(
-            kind, parts.base, parts.spread, parts.box, shift, float(tolerance), whole, room, *work, answer, worst
+            kind, parts.base, parts.spread, parts.flags, shift, float(tolerance), whole, room, *work, answer, worst
         )
         if outcome != hull.FULL:
             break
@@ -70,17 +70,17 @@ def largest(
     return Ball(lower, upper, worst, int(outcome), float(answer[3]), float(answer[4]), int(answer[2]))
 
 
-def separated(base: Array, spread: Array, box: BoolArray) -> tuple[BoolArray, Array]:
+def separated(base: Array, spread: Array, flags: IntArray) -> tuple[BoolArray, Array]:
     """For N grasps of k contacts: whether a direction was found along which none can push, and the direction.
 
-    ``base (N, k, d)``, ``spread (N, k, 3, d)``, ``box (N, k)``; the cone bases reach at most 2e-9 of their size along
+    ``base (N, k, d)``, ``spread (N, k, 3, d)``, ``flags (N, k)``; the cone bases reach at most 2e-9 of their size along
     the direction ``(N, d)`` (Farkas). Sets that do not span the space are left out.
     """
     n, d = base.shape[0], base.shape[2]
     verdict, worst = np.empty(n, np.int64), np.empty((n, d))
 
     def work(i: int, j: int) -> None:
-        hull.separate(base[i:j], spread[i:j], box[i:j], *_work(d, 512, 512), verdict[i:j], worst[i:j])
+        hull.separate(base[i:j], spread[i:j], flags[i:j], *_work(d, 512, 512), verdict[i:j], worst[i:j])
 
     over_ranges(work, n, 64)
     return verdict == hull.OUTSIDE, worst

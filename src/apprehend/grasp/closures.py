@@ -86,7 +86,7 @@ def force_closures(
         raise InputError(f"length is {scale.min()}; expected positive lengths in m")
     points = np.ascontiguousarray(p.reshape(count, k, 3))
     inward = np.ascontiguousarray((n / size[..., None]).reshape(count, k, 3))
-    parts = Generators(np.empty((count, k, 6)), np.empty((count, k, 3, 6)), np.empty((count, k), np.bool_))
+    parts = Generators(np.empty((count, k, 6)), np.empty((count, k, 3, 6)), np.empty((count, k), np.int64))
     codes = np.full((count, k), CODES[kind], np.int64)
     over_ranges(
         lambda a, b: kernel.generate(
@@ -132,7 +132,7 @@ def decide(parts: Generators) -> tuple[IntArray, Array, Array, Array]:
     over_ranges(work, count, 256)
     rest = np.flatnonzero(verdict == kernel.UNDECIDED)
     if len(rest):
-        outside, worst = separated(parts.base[rest], parts.spread[rest], parts.box[rest])
+        outside, worst = separated(parts.base[rest], parts.spread[rest], parts.flags[rest])
         verdict[rest[outside]], wrench[rest[outside]] = kernel.OPEN, worst[outside]
     return verdict, margin, force, wrench
 
@@ -152,7 +152,7 @@ def closed(grasps: Sequence[Grasp]) -> BoolArray:
         )
     sets = [g.generators for g in grasps]
     parts = Generators(
-        np.stack([s.base for s in sets]), np.stack([s.spread for s in sets]), np.stack([s.box for s in sets])
+        np.stack([s.base for s in sets]), np.stack([s.spread for s in sets]), np.stack([s.flags for s in sets])
     )
     verdict = decide(parts)[0]
     answer: BoolArray = verdict == kernel.CLOSED

@@ -12,11 +12,13 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, as_array, as_shaped
 from ..bodies import Body
 from ..errors import InputError
+from ..kernels.hull_support import BOX, SAME
 from .ball import Generators
 from .closure import Closure, force_closure, form_closure
 from .contact import Contact, ContactModel
 from .force_program import Limits, with_torques
 from .forces import ContactForces, ForceBatch, contact_forces
+from .patch import Patch
 from .program import ContactCone, contact_cone
 from .push import Push, largest_force
 from .quality import Quality, measure
@@ -30,22 +32,26 @@ OFF_SURFACE = 0.02
 class Grasp:
     """A set of contacts that hold a body (G 2.1.2: the pair of grasp matrix and friction cones).
 
-    *contacts*: all in space, or all in the plane; models may be mixed. *body* gives the reference point (its centre of
-    mass) and the length that torques are divided by in qualities (its radius); *reference* ``(d,)`` and *length* set
-    them by hand. Without a body the reference is the origin and the length 1 m. Wrenches are (f, τ) about the
-    reference point, in axes of the body; in the plane (f_x, f_y, τ).
+    *contacts*: `Contact` and `Patch`, all in space, or all in the plane; models may be mixed. A patch counts as the
+    contacts at its corners; *parts* are the indices of the contacts that each thing given became. *body* gives the
+    reference point (its centre of mass) and the length that torques are divided by in qualities (its radius);
+    *reference* ``(d,)`` and *length* set them by hand. Without a body the reference is the origin and the length 1 m.
+    Wrenches are (f, τ) about the reference point, in axes of the body; in the plane (f_x, f_y, τ).
     Raises `InputError` for no contacts, mixed dimensions, and contacts that do not lie on the body.
     """
 
     def __init__(
         self,
-        contacts: Iterable[Contact],
+        contacts: Iterable[Contact | Patch],
         body: Body | None = None,
         *,
         reference: ArrayLike | None = None,
         length: float | None = None,
     ) -> None:
-        self.contacts = tuple(contacts)
+        given = [c.contacts if isinstance(c, Patch) else (c,) for c in contacts]
+        self.contacts = tuple(c for group in given for c in group)
+        ends = np.cumsum([0, *map(len, given)]).tolist()
+        self.parts = tuple(tuple(range(a, b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
         if not self.contacts:
             raise InputError("contacts is empty; a grasp needs at least one contact")
         dimensions = {c.dimension for c in self.contacts}
@@ -162,7 +168,9 @@ class Grasp:
     def generators(self) -> Generators:
         """Bases of the cones with unit normal force, in scaled wrench space."""
         k, p = len(self), self.wrench_size
-        base, spread, box = np.zeros((k, p)), np.zeros((k, 3, p)), np.zeros(k, np.bool_)
+        base, spread, flags = np.zeros((k, p)), np.zeros((k, 3, p)), np.zeros(k, np.int64)
+        for part in self.parts:
+            flags[list(part[1:])] = SAME
         G = self.matrix * self.scale[:, None]
         for i, (contact, s) in enumerate(zip(self.contacts, self.slices, strict=True)):
             columns = G[:, s]
@@ -175,8 +183,8 @@ class Grasp:
                 spread[i, 0], spread[i, 1] = contact.friction * columns[:, 0], contact.friction * columns[:, 1]
                 if contact.size == 4:
                     spread[i, 2] = contact.torsion * columns[:, 3]
-                    box[i] = contact.model is ContactModel.SOFT_BOX
-        return Generators(base, spread, box)
+                    flags[i] |= BOX if contact.model is ContactModel.SOFT_BOX else 0
+        return Generators(base, spread, flags)
 
     def edges(self, m: int = 8) -> Array:
         """Wrenches ``(E, p)``, scaled, of cones with *m* edges inscribed in each friction cone, unit normal force each.
@@ -184,27 +192,31 @@ class Grasp:
         Edges lie at angles 2πk/m from t₁ towards t₂; those of a soft finger are doubled with ``±γ`` (box), or joined
         by the two poles of the ellipsoid (elliptic). In the plane two edges are exact.
         """
+        return np.concatenate(self.edge_groups(m))
+
+    def edge_groups(self, m: int = 8) -> list[Array]:
+        """As `edges`, for each contact its own ``(E_i, p)``."""
         if m < 3:
             raise InputError(f"m is {m}; a polyhedral cone needs at least 3 edges")
-        base, spread, box = self.generators
+        base, spread, flags = self.generators
         turn = 2.0 * np.pi * np.arange(m) / m
         rings = base[:, None] + np.cos(turn)[:, None] * spread[:, None, 0] + np.sin(turn)[:, None] * spread[:, None, 1]
         if all(c.size == 3 for c in self.contacts):
-            return rings.reshape(-1, self.wrench_size)
+            return list(rings)
         rows = []
-        for contact, b, s, is_box, ring in zip(self.contacts, base, spread, box, rings, strict=True):
+        for contact, b, s, flag, ring in zip(self.contacts, base, spread, flags, rings, strict=True):
             if contact.size == 1:
                 rows.append(b[None])
             elif contact.dimension == 2:
                 rows.append(np.stack([b + s[0], b - s[0]]))
             else:
-                if is_box:
-                    rows += [ring + s[2], ring - s[2]]
+                if flag & BOX:
+                    rows.append(np.concatenate([ring + s[2], ring - s[2]]))
                 elif contact.size == 4:
-                    rows += [ring, np.stack([b + s[2], b - s[2]])]
+                    rows.append(np.concatenate([ring, np.stack([b + s[2], b - s[2]])]))
                 else:
                     rows.append(ring)
-        return np.concatenate(rows)
+        return rows
 
     # properties
 
@@ -217,10 +229,11 @@ class Grasp:
         return form_closure(self)
 
     def removable(self) -> tuple[int, ...]:
-        """Indices of contacts any one of which may be taken away while the grasp stays force-closure."""
+        """Indices of contacts (of *parts*, where there are patches) any one of which the grasp can lose and stay
+        force-closure."""
         keep = []
-        for i in range(len(self)):
-            rest = [c for j, c in enumerate(self.contacts) if j != i]
+        for i, part in enumerate(self.parts):
+            rest = [c for j, c in enumerate(self.contacts) if j not in part]
             if rest and Grasp(rest, reference=self.reference, length=self.length).force_closure().success:
                 keep.append(i)
         return tuple(keep)

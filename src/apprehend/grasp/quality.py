@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,14 +13,12 @@ from ..arrays import Array, as_array, choice
 from ..errors import InputError
 from ..kernels import hull
 from .ball import Ball, Generators, largest
+from .measures import MORE, PLAIN
 
 if TYPE_CHECKING:
     from .grasp import Grasp
 
-KINDS = (
-    "epsilon", "volume", "mean_facet_distance", "min_singular_value", "isotropy", "grasp_volume", "task_ellipsoid",
-    "centroid_distance", "polygon_area",
-)  # fmt: skip
+KINDS = ("epsilon", "volume", "mean_facet_distance", "task_ellipsoid", *MORE, *PLAIN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,21 +39,27 @@ class Quality:
 def measure(grasp: Grasp, kind: str = "epsilon", **options: Any) -> Quality:
     """The quality *kind* of a grasp; wrenches are scaled (torques over `Grasp.length`) and taken about its reference.
 
-    ``epsilon`` (*norm*, *cone*, *m*, *gap*, *subspace*): radius of the largest ball in the wrench space
-    (Ferrari and Canny 1992). *norm* ``"l1"``: normal forces that sum to at most one (convex hull of the union);
-    ``"linf"``: at most one each (Minkowski sum). *cone* ``"exact"``: friction cones as they are, the answer an
-    interval with ``upper − lower ≤ gap · upper``; or ``"polyhedral"`` with *m* edges, an exact number and a lower
-    bound of the former. *subspace* ``(s, p)``: orthonormal rows onto which the wrench space is projected first, or
-    ``"force"``, ``"torque"`` (G 2.2.3: forces or torques only). Zero if the grasp is not force-closure.
+    ``epsilon`` (*norm*, *cone*, *m*, *gap*, *subspace*, *bound*): radius of the largest ball in the wrench space
+    (Ferrari and Canny 1992). *norm* ``"l1"``: contact forces that sum to at most one (convex hull of the union);
+    ``"linf"``: at most one each, patches as a whole (Minkowski sum). *bound* says what is summed: ``"normal"`` forces
+    (G 2.2.3), or the ``"magnitude"`` of forces (the original; Coulomb contacts and frictionless ones). *cone*
+    ``"exact"``: friction cones as they are, the answer an interval with ``upper − lower ≤ gap · upper``; or
+    ``"polyhedral"`` with *m* edges, an exact number and a lower bound of the former. *subspace* ``(s, p)``:
+    orthonormal rows onto which the wrench space is projected first, or ``"force"``, ``"torque"`` (G 2.2.3: forces or
+    torques only). Zero if the grasp is not force-closure.
 
     ``volume``, ``mean_facet_distance`` (*m*, *subspace*): of the polyhedral L1 hull, the origin included.
 
     ``task_ellipsoid`` (*sigma* ``(p, p)``, *centre* ``(p,)``, *norm*, *cone*, *m*, *gap*): the largest ε for which all
     wrenches with ``(w − c)ᵗ Σ⁻¹ (w − c) ≤ ε`` can be exerted (G 2.8.1, by default with L∞); in scaled wrench space.
 
-    ``min_singular_value`` of G, ``isotropy`` (σ_min / σ_max), ``grasp_volume`` (√det GGᵗ, the product of the singular
-    values); ``centroid_distance``: from the middle of the contacts to the reference, in m; ``polygon_area``: of the
-    three contacts of a three-finger grasp, in m².
+    Without a wrench space: ``min_singular_value`` of G, ``isotropy`` (σ_min / σ_max), ``grasp_volume`` (√det GGᵗ, the
+    product of the singular values); ``centroid_distance`` from the middle of the contacts to the reference, in m;
+    ``polygon_area`` in m² of the contacts, seen in their plane, and ``polygon_shape``, 0 if regular, 1 at worst;
+    ``normal_balance``, 1 if the normals cancel; ``orthogonality`` (*approach* ``(3,)``) in rad, 0 if the hand comes
+    along or square to the body's long axis; ``min_weight`` (*m*): the largest least weight of the edges that balance;
+    ``position_margin``: every contact may be off by that many m, its normal kept, and force closure is certain (a
+    lower bound). Of the hand: `HandGrasp.quality`.
     """
     choice(kind, "kind", KINDS)
     calls: dict[str, Callable[..., Quality]] = {
@@ -63,55 +67,62 @@ def measure(grasp: Grasp, kind: str = "epsilon", **options: Any) -> Quality:
     }  # fmt: skip
     if kind in calls:
         return calls[kind](grasp, **options)
+    if kind in MORE:
+        return _exact(kind, *MORE[kind](grasp, **options))
     if options:
         raise InputError(f"quality {kind!r} takes no options; got {', '.join(options)}")
-    p = grasp.wrench_size
-    s = np.zeros(p)
-    found = np.linalg.svd(grasp.matrix * grasp.scale[:, None], compute_uv=False)
-    s[: len(found)] = found[:p]
-    points = np.array([c.position for c in grasp.contacts])
-    if kind == "min_singular_value":
-        return _exact(kind, float(s[-1]), grasp._svd[0][:, -1].copy())
-    if kind == "isotropy":
-        return _exact(kind, float(s[-1] / s[0]) if s[0] > 0.0 else 0.0, grasp._svd[0][:, -1].copy())
-    if kind == "grasp_volume":
-        return _exact(kind, float(np.prod(s)), np.zeros(p))
-    if kind == "centroid_distance":
-        return _exact(kind, float(np.linalg.norm(points.mean(axis=0) - grasp.reference)), np.zeros(p))
-    if len(points) != 3:
-        raise InputError(f"polygon_area is defined for three contacts; this grasp has {len(points)}")
-    a, b = points[1] - points[0], points[2] - points[0]
-    squared = float((a @ a) * (b @ b) - (a @ b) ** 2)
-    return _exact(kind, 0.5 * float(np.sqrt(max(squared, 0.0))), np.zeros(p))
+    answer = _exact(kind, *PLAIN[kind](grasp))
+    return replace(answer, upper=np.inf) if kind == "position_margin" else answer
 
 
 def _exact(kind: str, value: float, worst: Array) -> Quality:
     return Quality(value, value, value, worst, kind)
 
 
-def _parts(grasp: Grasp, norm: str, cone: str, m: int) -> tuple[int, Generators]:
+def _parts(grasp: Grasp, norm: str, cone: str, m: int, bound: str = "normal") -> tuple[int, Generators]:
     """The kind of set and its generators for `ball.largest`."""
     choice(norm, "norm", ("l1", "linf"))
     choice(cone, "cone", ("exact", "polyhedral"))
-    p = grasp.wrench_size
-    if cone == "exact" or (grasp.dimension == 2 and norm == "linf"):
-        return (hull.UNION if norm == "l1" else hull.SUM), grasp.generators
-    if norm == "linf":
-        raise InputError(
-            'norm "linf" is computed with exact cones; the polyhedral sum has m^k points and is only its lower bound: '
-            'use cone="exact"'
-        )
-    points = np.concatenate([grasp.edges(m), np.zeros((1, p))])
-    return hull.POINTS, _points(points)
+    choice(bound, "bound", ("normal", "magnitude"))
+    magnitude = bound == "magnitude"
+    if magnitude and any(c.torsion > 0.0 and c.size == 4 for c in grasp.contacts):
+        raise InputError('bound "magnitude" is defined for point contacts; soft fingers pass on a moment: use "normal"')
+    if magnitude and any(len(part) > 1 for part in grasp.parts) and norm == "linf":
+        raise InputError('bound "magnitude" with norm "linf" is not defined for patches; use "normal"')
+    if cone == "exact":
+        if not magnitude:
+            return (hull.UNION if norm == "l1" else hull.SUM), grasp.generators
+        base, spread, flags = grasp.generators
+        mu = np.array([c.friction if c.size > 1 else 0.0 for c in grasp.contacts])
+        caps = spread / np.where(mu > 0.0, mu, 1.0)[:, None, None]
+        caps[:, 2] = 0.0
+        caps[:, 2, 0] = mu
+        return (hull.CAP_UNION if norm == "l1" else hull.CAP_SUM), Generators(base, caps, flags)
+    groups = grasp.edge_groups(m)
+    if magnitude:
+        groups = [
+            edges / np.sqrt(1.0 + (c.friction if c.size > 1 else 0.0) ** 2)
+            for edges, c in zip(groups, grasp.contacts, strict=True)
+        ]
+    points = np.concatenate(groups)
+    if norm == "l1":
+        return hull.POINTS, _points(np.concatenate([points, np.zeros((1, grasp.wrench_size))]))
+    flags = np.full(len(points), hull.SAME, np.int64)
+    ends = np.cumsum([0, *map(len, groups)])
+    flags[ends[[part[0] for part in grasp.parts]]] = 0
+    return hull.SUM, Generators(points, np.zeros((len(points), 3, grasp.wrench_size)), flags)
 
 
 def _points(points: Array) -> Generators:
-    return Generators(np.ascontiguousarray(points), np.zeros((1, 3, points.shape[1])), np.zeros(1, np.bool_))
+    return Generators(np.ascontiguousarray(points), np.zeros((1, 3, points.shape[1])), np.zeros(1, np.int64))
 
 
-def _mapped(parts: Generators, rows: Array) -> Generators:
+def _mapped(kind: int, parts: Generators, rows: Array) -> Generators:
     """The set under the linear map *rows* ``(s, p)``."""
-    return Generators(np.ascontiguousarray(parts.base @ rows.T), np.ascontiguousarray(parts.spread @ rows.T), parts.box)
+    spread = np.ascontiguousarray(parts.spread @ rows.T)
+    if kind in (hull.CAP_UNION, hull.CAP_SUM):
+        spread[:, 2, 0] = parts.spread[:, 2, 0]  # µ, not a wrench
+    return Generators(np.ascontiguousarray(parts.base @ rows.T), spread, parts.flags)
 
 
 def _rows(grasp: Grasp, subspace: ArrayLike | str | None) -> Array | None:
@@ -124,8 +135,6 @@ def _rows(grasp: Grasp, subspace: ArrayLike | str | None) -> Array | None:
     rows = np.atleast_2d(as_array(subspace, "subspace"))
     if rows.shape[1] != p or np.abs(rows @ rows.T - np.eye(len(rows))).max() > 1e-9:
         raise InputError(f"subspace has shape {rows.shape}; expected orthonormal rows (s, {p})")
-    if len(rows) < 2:
-        raise InputError("subspace has one row; use Grasp.largest_force along that direction and its opposite")
     return rows
 
 
@@ -143,13 +152,30 @@ def _epsilon(
     m: int = 8,
     gap: float = 0.01,
     subspace: ArrayLike | str | None = None,
+    bound: str = "normal",
 ) -> Quality:
-    kind, parts = _parts(grasp, norm, cone, m)
+    kind, parts = _parts(grasp, norm, cone, m, bound)
     rows = _rows(grasp, subspace)
     if rows is not None:
-        parts = _mapped(parts, rows)
-    tolerance = 0.0 if kind == hull.POINTS else gap
+        parts = _mapped(kind, parts, rows)
+        if len(rows) == 1:
+            return _line(kind, parts, rows[0])
+    tolerance = 0.0 if cone == "polyhedral" else _gap(gap)
     return _interval(grasp, "epsilon", largest(kind, parts, tolerance=tolerance), rows)
+
+
+def _gap(gap: float) -> float:
+    if not 0.0 < gap < 1.0:
+        raise InputError(f"gap is {gap}; expected a share of the upper bound between 0 and 1, such as 0.01")
+    return float(gap)
+
+
+def _line(kind: int, parts: Generators, row: Array) -> Quality:
+    """The ball on a line: the nearer end of what the set reaches along it."""
+    out, zero = np.empty(1), np.zeros(1)
+    ends = {sign: float(hull.support(kind, *parts, zero, np.array([sign]), out)) for sign in (1.0, -1.0)}
+    worst = min(ends, key=lambda sign: ends[sign])
+    return _exact("epsilon", max(ends[worst], 0.0), worst * row)
 
 
 def _whole(grasp: Grasp, m: int, subspace: ArrayLike | str | None) -> Ball:
@@ -188,8 +214,8 @@ def _task_ellipsoid(
     if c.shape != (p,):
         raise InputError(f"centre has shape {c.shape}; expected ({p},)")
     kind, parts = _parts(grasp, norm, cone, m)
-    tolerance = 0.0 if kind == hull.POINTS else 0.5 * gap
-    ball = largest(kind, _mapped(parts, root), tolerance=tolerance, centre=root @ c)
+    tolerance = 0.0 if cone == "polyhedral" else 0.5 * _gap(gap)
+    ball = largest(kind, _mapped(kind, parts, root), tolerance=tolerance, centre=root @ c)
     answer = _interval(grasp, "task_ellipsoid", ball, None, power=2)
     worst = root @ ball.worst
     length = float(np.linalg.norm(worst))

@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
+from .hull_support import BOX
 from .lanes import LANES
 
 CLOSED, OPEN, UNDECIDED = 0, 2, 3
@@ -27,11 +28,11 @@ RESIDUAL = 1e-11
 
 
 @kernel
-def generate(points, normals, friction, torsion, kind, reference, scale, base, spread, box):  # type: ignore[no-untyped-def]
+def generate(points, normals, friction, torsion, kind, reference, scale, base, spread, flags):  # type: ignore[no-untyped-def]
     """Cone bases of contacts in space: ``points, normals (N, k, 3)``, ``friction, torsion (N, k)``, ``kind (N, k)``.
 
     Kinds: 0 without friction, 1 Coulomb, 2 soft (elliptic), 3 soft (box). ``reference (N, 3)``, ``scale (N,)`` of
-    torques. *base* ``(N, k, 6)``, *spread* ``(N, k, 3, 6)``, *box* ``(N, k)``. Tangents as in `Contact.rotation`.
+    torques. *base* ``(N, k, 6)``, *spread* ``(N, k, 3, 6)``, *flags* ``(N, k)``. Tangents as in `Contact.rotation`.
     """
     t = np.empty((3, 3))
     for g in range(points.shape[0]):
@@ -67,15 +68,15 @@ def generate(points, normals, friction, torsion, kind, reference, scale, base, s
             for j in range(3):
                 spread[g, i, 2, j] = 0.0
                 spread[g, i, 2, 3 + j] = gamma * t[2, j]
-            box[g, i] = what == 3
+            flags[g, i] = BOX if what == 3 else 0
 
 
 @kernel
-def _load(base, spread, box, g, lane, B, boxed, Y):  # type: ignore[no-untyped-def]
+def _load(base, spread, flags, g, lane, B, boxed, Y):  # type: ignore[no-untyped-def]
     """Put grasp *g* into a lane; its largest entry."""
     size = 0.0
     for i in range(base.shape[1]):
-        boxed[i, lane] = 1.0 if box[g, i] else 0.0
+        boxed[i, lane] = 1.0 if flags[g, i] & BOX else 0.0
         for j in range(base.shape[2]):
             B[i, 0, j, lane] = base[g, i, j]
             size = max(size, abs(base[g, i, j]))
@@ -226,8 +227,8 @@ def _correct(B, boxed, dY, C, P, F, rest, slack, total, step):  # type: ignore[n
 
 
 @kernel
-def prove(base, spread, box, margin, steps, verdict, slack_out, force, wrench):  # type: ignore[no-untyped-def]
-    """Decide force closure of grasps ``base (N, k, d)``, ``spread (N, k, 3, d)``, ``box (N, k)``.
+def prove(base, spread, flags, margin, steps, verdict, slack_out, force, wrench):  # type: ignore[no-untyped-def]
+    """Decide force closure of grasps ``base (N, k, d)``, ``spread (N, k, 3, d)``, ``flags (N, k)``.
 
     CLOSED needs an internal force at least *margin* inside every cone; after *steps* a grasp is UNDECIDED.
     *slack_out* ``(N,)``: how far inside; *force* ``(N, k, 4)``: normal force and parts along the half-axes (in units
@@ -242,10 +243,10 @@ def prove(base, spread, box, margin, steps, verdict, slack_out, force, wrench): 
     owner, age, size = np.empty(LANES, np.int64), np.zeros(LANES, np.int64), np.zeros(LANES)
     following, busy = 0, 0
     for l in range(LANES):
-        _load(base, spread, box, min(following, N - 1), l, B, boxed, Y)
+        _load(base, spread, flags, min(following, N - 1), l, B, boxed, Y)
         owner[l] = -1
         if following < N:
-            size[l] = _load(base, spread, box, following, l, B, boxed, Y)
+            size[l] = _load(base, spread, flags, following, l, B, boxed, Y)
             owner[l], following, busy = following, following + 1, busy + 1
     while busy:
         _model(B, boxed, Y, C, P, H, grad, reach)
@@ -284,7 +285,7 @@ def prove(base, spread, box, margin, steps, verdict, slack_out, force, wrench): 
             for j in range(d):
                 dY[j, l] = 0.0
             if following < N:
-                size[l] = _load(base, spread, box, following, l, B, boxed, Y)
+                size[l] = _load(base, spread, flags, following, l, B, boxed, Y)
                 owner[l], following = following, following + 1
             else:
                 owner[l], busy = -1, busy - 1

@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .hull_support import BASES, CAP_SUM, CAP_UNION, GROUPS, POINTS, SUM, UNION, first_simplex, support
+from .hull_support import BASES, BOX, CAP_SUM, CAP_UNION, POINTS, SAME, SUM, UNION, first_simplex, support
 
 __all__ = [
-    "BASES", "CAP_SUM", "CAP_UNION", "CLOSED", "FLAT", "FULL", "GROUPS", "OUTSIDE", "POINTS", "SUM", "UNION", "grow",
+    "BASES", "BOX", "CAP_SUM", "CAP_UNION", "CLOSED", "FLAT", "FULL", "OUTSIDE", "POINTS", "SAME", "SUM", "UNION", "grow",
     "separate", "support",
 ]  # fmt: skip
 
@@ -282,7 +282,22 @@ def _measure(hull, answer, worst, normal):  # type: ignore[no-untyped-def]
 
 @kernel
 def grow(
-    kind, base, spread, box, shift, tolerance, whole, steps, points, corners, near, planes, alive, codes, answer, worst
+    kind,
+    base,
+    spread,
+    flags,
+    shift,
+    tolerance,
+    whole,
+    steps,
+    points,
+    corners,
+    near,
+    planes,
+    alive,
+    codes,
+    answer,
+    worst,
 ):  # type: ignore[no-untyped-def]
     """Radius of the largest ball about the origin in the set, between two bounds.
 
@@ -301,7 +316,7 @@ def grow(
     rounding = 1e-12 * size
     answer[:] = 0.0
     worst[:] = 0.0
-    if not first_simplex(kind, base, spread, box, shift, d, points, 1e-9 * size):
+    if not first_simplex(kind, base, spread, flags, shift, d, points, 1e-9 * size):
         return FLAT
     u, p = np.empty(d), np.empty(d)
     hull = _polytope(points, corners, near, planes, alive, codes)
@@ -316,7 +331,7 @@ def grow(
             break
         for j in range(d):
             u[j] = planes[nearest, j]
-        value = support(kind, base, spread, box, shift, u, p)
+        value = support(kind, base, spread, flags, shift, u, p)
         if value < upper:
             upper = value
             for j in range(d):
@@ -327,9 +342,9 @@ def grow(
         if value - lower <= rounding * 10.0 or (not whole and upper - lower <= tolerance * upper):
             if not whole:
                 good, offset = _plane(points, corners, nearest, hull.inside, u, hull.rows)
-                if good and kind in (POINTS, GROUPS):
+                if good and kind == POINTS:
                     lower = offset
-                    upper = support(kind, base, spread, box, shift, u, p)
+                    upper = support(kind, base, spread, flags, shift, u, p)
                     for j in range(d):
                         worst[j] = u[j]
                 answer[0], answer[1], answer[2] = lower, max(upper, lower), numbers[0] - numbers[2]
@@ -354,8 +369,8 @@ def grow(
 
 
 @kernel
-def separate(base, spread, box, points, corners, near, planes, alive, codes, verdict, worst):  # type: ignore[no-untyped-def]
-    """Directions along which no contact can push: ``base (N, k, d)``, ``spread (N, k, 3, d)``, ``box (N, k)``.
+def separate(base, spread, flags, points, corners, near, planes, alive, codes, verdict, worst):  # type: ignore[no-untyped-def]
+    """Directions along which no contact can push: ``base (N, k, d)``, ``spread (N, k, 3, d)``, ``flags (N, k)``.
 
     *verdict* ``(N,)``: OUTSIDE where the cone bases reach at most 2e-9 of their size along *worst* ``(N, d)``; else an
     outcome of `grow`.
@@ -369,7 +384,7 @@ def separate(base, spread, box, points, corners, near, planes, alive, codes, ver
                 t += base[n, i, j] * base[n, i, j]
             size = max(size, np.sqrt(t))
         verdict[n] = grow(
-            BASES, base[n], spread[n], box[n], shift, 0.5, False, 200, points, corners, near, planes, alive, codes,
+            BASES, base[n], spread[n], flags[n], shift, 0.5, False, 200, points, corners, near, planes, alive, codes,
             answer, worst[n],
         )  # fmt: skip
         if verdict[n] != FLAT and answer[1] <= 2e-9 * size:

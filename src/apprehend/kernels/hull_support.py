@@ -6,22 +6,24 @@ import numpy as np
 
 from ._jit import kernel
 
-POINTS, UNION, SUM, BASES, GROUPS, CAP_UNION, CAP_SUM = 0, 1, 2, 3, 4, 5, 6
-"""Kinds of sets: hull of points (rows of *base*); hull of the union of cone bases and the origin (L1); sum of those
-(L∞); hull of the cone bases alone; sum of hulls of groups of points, the origin added to each (*box* marks the first
-row of a group); union and sum of caps: forces in the cone of length at most one. Of a cap, *base* is the wrench of the
-unit normal force, ``spread[0]`` and ``spread[1]`` those of unit tangential forces, and ``spread[2, 0]`` is µ."""
+POINTS, UNION, SUM, BASES, CAP_UNION, CAP_SUM = 0, 1, 2, 3, 4, 5
+"""Kinds of sets: hull of points (rows of *base*); hull of the union of cone bases and the origin (L1); sum of the hulls
+of groups of cone bases, the origin added to each (L∞); hull of the cone bases alone; union and sum of caps: forces in
+the cone of length at most one. Of a cap, *base* is the wrench of the unit normal force, ``spread[0]`` and
+``spread[1]`` those of unit tangential forces, and ``spread[2, 0]`` is µ."""
+BOX, SAME = 1, 2
+"""Flags of a base: its third half-axis is limited on its own; it belongs to the group of the base before it."""
 
 
 @kernel
-def support(kind, base, spread, box, shift, u, out):  # type: ignore[no-untyped-def]
+def support(kind, base, spread, flags, shift, u, out):  # type: ignore[no-untyped-def]
     """Support value of the set along *u*, and the point that attains it.
 
     ``base (k, d)``: points, or axes of cone bases; ``spread (k, 3, d)``: half-axes of each base; a base is
-    ``axis + Σ s_j half_j`` with ``‖s‖ ≤ 1``, or with *box* ``(k,)`` ``s₀² + s₁² ≤ 1, |s₂| ≤ 1``. The whole set is
-    moved by ``−shift``.
+    ``axis + Σ s_j half_j`` with ``‖s‖ ≤ 1``, or with the flag BOX in ``flags (k,)`` ``s₀² + s₁² ≤ 1, |s₂| ≤ 1``. The
+    whole set is moved by ``−shift``.
     """
-    value = _support(kind, base, spread, box, u, out)
+    value = _support(kind, base, spread, flags, u, out)
     for j in range(u.shape[0]):
         out[j] -= shift[j]
         value -= shift[j] * u[j]
@@ -29,7 +31,7 @@ def support(kind, base, spread, box, shift, u, out):  # type: ignore[no-untyped-
 
 
 @kernel
-def _support(kind, base, spread, box, u, out):  # type: ignore[no-untyped-def]
+def _support(kind, base, spread, flags, u, out):  # type: ignore[no-untyped-def]
     d = u.shape[0]
     best, chosen, total = -np.inf, 0, 0.0
     if kind == POINTS:
@@ -44,57 +46,29 @@ def _support(kind, base, spread, box, u, out):  # type: ignore[no-untyped-def]
         return best
     for j in range(d):
         out[j] = 0.0
-    if kind == GROUPS:
-        return _support_groups(base, box, u, out)
     if kind >= CAP_UNION:
         return _support_caps(kind == CAP_SUM, base, spread, u, out)
     for i in range(base.shape[0]):
+        if kind == SUM and i > 0 and not flags[i] & SAME:
+            if best > 0.0:
+                total += best
+                _reach(base[chosen], spread[chosen], flags[chosen], u, out)
+            best = -np.inf
         v, s0, s1, s2 = 0.0, 0.0, 0.0, 0.0
         for j in range(d):
             v += base[i, j] * u[j]
             s0 += spread[i, 0, j] * u[j]
             s1 += spread[i, 1, j] * u[j]
             s2 += spread[i, 2, j] * u[j]
-        if box[i]:
+        if flags[i] & BOX:
             v += np.sqrt(s0 * s0 + s1 * s1) + abs(s2)
         else:
             v += np.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
-        if kind == SUM and v > 0.0:
-            total += v
-            _reach(base[i], spread[i], box[i], s0, s1, s2, out)
-        elif v > best:
-            best, chosen = v, i
-    if kind == SUM:
-        return total
-    if kind == UNION and best <= 0.0:  # the origin belongs to the set
-        return 0.0
-    s0, s1, s2 = 0.0, 0.0, 0.0
-    for j in range(d):
-        s0 += spread[chosen, 0, j] * u[j]
-        s1 += spread[chosen, 1, j] * u[j]
-        s2 += spread[chosen, 2, j] * u[j]
-    _reach(base[chosen], spread[chosen], box[chosen], s0, s1, s2, out)
-    return best
-
-
-@kernel
-def _support_groups(base, first, u, out):  # type: ignore[no-untyped-def]
-    d, count = u.shape[0], base.shape[0]
-    total, best, chosen = 0.0, 0.0, -1
-    for i in range(count + 1):
-        if i == count or first[i]:
-            if chosen >= 0:
-                total += best
-                for j in range(d):
-                    out[j] += base[chosen, j]
-            best, chosen = 0.0, -1
-            if i == count:
-                break
-        v = 0.0
-        for j in range(d):
-            v += base[i, j] * u[j]
         if v > best:
             best, chosen = v, i
+    if best > 0.0 or kind == BASES:  # else the origin, which belongs to the other sets
+        _reach(base[chosen], spread[chosen], flags[chosen], u, out)
+        total += best
     return total
 
 
@@ -109,12 +83,12 @@ def _support_caps(add, base, spread, u, out):  # type: ignore[no-untyped-def]
             x += spread[i, 0, j] * u[j]
             y += spread[i, 1, j] * u[j]
         t = np.sqrt(x * x + y * y)
-        if t <= mu * n:  # the direction lies in the cone
+        if n > 0.0 and t <= mu * n:  # the direction lies in the cone
             value = np.sqrt(n * n + t * t)
-            a, b = (n / value, 1.0 / value) if value > 0.0 else (0.0, 0.0)
+            a, b = n / value, 1.0 / value
         else:  # the nearest edge of the cone
             a = 1.0 / np.sqrt(1.0 + mu * mu)
-            value, b = a * (n + mu * t), a * mu / t
+            value, b = a * (n + mu * t), (a * mu / t if t > 0.0 else 0.0)
         if value <= 0.0 or (not add and value <= best):
             continue
         if not add:
@@ -128,9 +102,14 @@ def _support_caps(add, base, spread, u, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _reach(axis, half, box, s0, s1, s2, out):  # type: ignore[no-untyped-def]
-    """Add to *out* the point of a base that is farthest along the direction with components s in the half-axes."""
-    if box:
+def _reach(axis, half, flags, u, out):  # type: ignore[no-untyped-def]
+    """Add to *out* the point of a base that is farthest along *u*."""
+    s0, s1, s2 = 0.0, 0.0, 0.0
+    for j in range(out.shape[0]):
+        s0 += half[0, j] * u[j]
+        s1 += half[1, j] * u[j]
+        s2 += half[2, j] * u[j]
+    if flags & BOX:
         n = np.sqrt(s0 * s0 + s1 * s1)
         s2 = 1.0 if s2 > 0.0 else (-1.0 if s2 < 0.0 else 0.0)
     else:
@@ -142,13 +121,13 @@ def _reach(axis, half, box, s0, s1, s2, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def first_simplex(kind, base, spread, box, shift, d, points, scale):  # type: ignore[no-untyped-def]
+def first_simplex(kind, base, spread, flags, shift, d, points, scale):  # type: ignore[no-untyped-def]
     """Corners of a first simplex in ``points[0 … d]``: False if the set is flat to within *scale*."""
     axes = np.zeros((d, d))
     u, low, high = np.empty(d), np.empty(d), np.empty(d)
     u[:] = 0.0
     u[0] = 1.0
-    support(kind, base, spread, box, shift, u, points[0])
+    support(kind, base, spread, flags, shift, u, points[0])
     for i in range(d):
         best = 0.0
         for trial in range(d):  # directions square to the span so far
@@ -166,7 +145,7 @@ def first_simplex(kind, base, spread, box, shift, d, points, scale):  # type: ig
             for j in range(d):
                 u[j] /= np.sqrt(n)
             for _ in range(2):
-                support(kind, base, spread, box, shift, u, high)
+                support(kind, base, spread, flags, shift, u, high)
                 t = 0.0
                 for j in range(d):
                     t += u[j] * (high[j] - points[0, j])
