@@ -10,6 +10,7 @@
 from .camera import View, hand_camera, look
 from .contacts import ContactTable, Touch
 from .control import JointController, Load, Saturation
+from .grasps import Held, held, held_in, simulated
 from .gripper import Gripper, GripResult, GripStatus, JawState, grip
 from .model import Plant, build
 from .physics import Physics
@@ -17,7 +18,7 @@ from .record import Recording
 from .world import Controller, SettleResult, SettleStatus, World
 
 __all__ = [
-    "ContactTable", "Controller", "Gripper", "GripResult", "GripStatus", "JawState", "JointController", "Load",
+    "ContactTable", "Controller", "Gripper", "GripResult", "GripStatus", "Held", "JawState", "JointController", "Load",
     "Physics", "Plant", "Recording", "Saturation", "SettleResult", "SettleStatus", "Touch", "View", "World", "build",
-    "grip", "hand_camera", "look",
+    "grip", "hand_camera", "held", "held_in", "look", "simulated",
 ]  # fmt: skip
