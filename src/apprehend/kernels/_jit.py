@@ -61,11 +61,15 @@ def cache_dir(path: Path) -> Path:
     return _cache_root() / "kernels" / f"{path.stem}-{state.hexdigest()[:16]}"
 
 
-def kernel(function: Callable[..., object] | None = None, *, inline: bool = False, fast: bool = True) -> Any:
+def kernel(
+    function: Callable[..., object] | None = None, *, inline: bool = False, fast: bool = True, borrow: bool = False
+) -> Any:
     """Compile *function* lazily with Numba, cached on disk, releasing the GIL.
 
     *inline* splices the body into its callers (for small helpers in lane loops); *fast* = False keeps strict IEEE
-    order of operations (for code whose last bits matter, such as exp and log near their edges).
+    order of operations (for code whose last bits matter, such as exp and log near their edges). *borrow* is for what
+    runs once per block, and neither makes nor returns an array: it counts no references to its arguments. (Each count
+    is an atomic operation on a cache line that all threads share; two threads then hinder each other.)
     """
 
     def wrap(f: Callable[..., object]) -> Any:
@@ -78,6 +82,7 @@ def kernel(function: Callable[..., object] | None = None, *, inline: bool = Fals
                 error_model="numpy",
                 fastmath=FAST if fast else False,
                 inline="always" if inline else "never",
+                _nrt=not borrow,
             )(f)
         finally:
             config.CACHE_DIR = before

@@ -43,6 +43,9 @@ MIXED = 2
 
 SINCOS_RANGE = 1e5
 
+NATURAL = 0x7FFFFFFFFFFFFFFF
+"""Mask that tells the compiler that an index is not negative, so that it need not count it from the end."""
+
 
 class ChainModel(NamedTuple):
     """Arrays of one chain; see the head of this module."""
@@ -63,29 +66,27 @@ def lane_buffer(components):
     return raw[start : start + components * LANES]
 
 
-@kernel
+@kernel(borrow=True)
 def load_block(q, first, count, out):
     """Rows ``first … first + LANES`` of ``q (N, n)`` into lanes ``out (n * LANES)``; past *count*, the last row again.
 
     Returns the first row that holds a NaN or an infinity, or −1.
     """
     n = q.shape[1]
-    total = 0.0
+    bad = -1
     for lane in range(LANES):
-        row = min(first + lane, count - 1)
+        row = min(first + lane, count - 1) & NATURAL
+        total = 0.0
         for j in range(n):
-            out[j * LANES + lane] = q[row, j]
-            total += q[row, j] * 0.0
-    if total == 0.0:
-        return -1
-    for row in range(first, min(first + LANES, count)):
-        for j in range(n):
-            if not math.isfinite(q[row, j]):
-                return row
-    return -1
+            value = q[row, j]
+            out[(j * LANES + lane) & NATURAL] = value
+            total += value * 0.0
+        if total != 0.0 and bad < 0:
+            bad = row
+    return bad
 
 
-@kernel
+@kernel(borrow=True)
 def wrap_angles(q, coordinate, multiplier, offset, value):
     """Angles of one joint on the lanes, brought within the range of `sincos` by whole turns."""
     for lane in range(LANES):
@@ -103,7 +104,7 @@ def at(index, width):
     return (index * width * LANES) & 0x7FFFFFFF
 
 
-@kernel
+@kernel(borrow=True)
 def within_sincos(q, model):
     """Whether every angle of a block ``q (n * LANES)`` is within the range of `sincos`: almost always."""
     total = 0.0
@@ -172,7 +173,7 @@ def slide_block(place, i, q, coordinate, multiplier, offset, pose, axes):
             axes[a + (3 + k) * L + lane] = b2
 
 
-@kernel
+@kernel(borrow=True)
 def place_block(place, i, pose):
     """Multiply ``pose (12 * LANES)`` by the constant transform ``place[i]`` from the right."""
     L = LANES
@@ -191,7 +192,7 @@ def place_block(place, i, pose):
             pose[(9 + k) * L + lane] += a0 * x + a1 * y + a2 * z
 
 
-@kernel
+@kernel(borrow=True)
 def chain_block(model, q, value, pose, axes):
     """Pose of the chain's end and the axes of its joints, on one block.
 
@@ -218,7 +219,7 @@ def chain_block(model, q, value, pose, axes):
     place_block(place, m, pose)
 
 
-@kernel
+@kernel(borrow=True)
 def jacobian_block(model, pose, axes, jacobian):
     """Mixed Jacobian of the chain's own coordinates, ``jacobian (6 * k * LANES)``, from what `chain_block` gave."""
     L = LANES
@@ -247,7 +248,7 @@ def jacobian_block(model, pose, axes, jacobian):
                 jacobian[c + lane] += gain * axes[a + 3 * L + lane]
 
 
-@kernel
+@kernel(borrow=True)
 def turn_jacobian_block(pose, columns, reference, jacobian):
     """Change the reference of a mixed Jacobian of *columns* columns, in place.
 
@@ -280,17 +281,34 @@ def turn_jacobian_block(pose, columns, reference, jacobian):
                         )
 
 
-@kernel
-def store_pose(pose, first, count, out):
-    """Lanes of ``pose (12 * LANES)`` into rows of ``out (N, 16)``."""
+@kernel(borrow=True)
+def store_block(lanes, where, first, count, out, column):
+    """Lanes into rows first … of ``out (N, w)``: entry *column* + j becomes the component that begins at ``where[j]``."""
     for lane in range(min(LANES, count - first)):
-        row = first + lane
-        for k in range(3):
-            for j in range(3):
-                out[row, 4 * k + j] = pose[(3 * k + j) * LANES + lane]
-            out[row, 4 * k + 3] = pose[(9 + k) * LANES + lane]
-            out[row, 12 + k] = 0.0
-        out[row, 15] = 1.0
+        row = (first + lane) & NATURAL
+        for j in range(where.shape[0]):
+            out[row, (column + j) & NATURAL] = lanes[(where[j] + lane) & NATURAL]
+
+
+@kernel
+def pose_buffer():
+    """A pose on lanes (12) with a zero and a one behind it, so that `store_block` can write whole matrices."""
+    pose = lane_buffer(14)
+    for lane in range(LANES):
+        pose[12 * LANES + lane] = 0.0
+        pose[13 * LANES + lane] = 1.0
+    return pose
+
+
+@kernel
+def pose_places():
+    """Where `store_block` finds the 16 entries of a matrix in a `pose_buffer`."""
+    where = np.empty(16, dtype=np.int64)
+    for k in range(4):
+        for j in range(3):
+            where[4 * k + j] = (3 * k + j if k < 3 else 12) * LANES
+        where[4 * k + 3] = (9 + k if k < 3 else 13) * LANES
+    return where
 
 
 @kernel
@@ -298,7 +316,8 @@ def chain_poses(model, q, start, stop, out):
     """Poses ``out (N, 16)`` of rows start … stop of ``q (N, n)``; returns the first row that is not finite, or −1."""
     buffer = lane_buffer(q.shape[1])
     value = lane_buffer(1)
-    pose = lane_buffer(12)
+    pose = pose_buffer()
+    where = pose_places()
     axes = lane_buffer(6 * model.kind.shape[0])
     bad = -1
     for first in range(start, stop, LANES):
@@ -306,13 +325,13 @@ def chain_poses(model, q, start, stop, out):
         if row >= 0 and bad < 0:
             bad = row
         chain_block(model, buffer, value, pose, axes)
-        store_pose(pose, first, stop, out)
+        store_block(pose, where, first, stop, out, 0)
     return bad
 
 
 @kernel
 def chain_jacobians(model, q, start, stop, reference, out, poses):
-    """Jacobians ``out (N, 6, n)`` (and ``poses (N, 16)`` unless it has no rows) of rows start … stop of ``q (N, n)``.
+    """Jacobians ``out (N, 6 n)`` (and ``poses (N, 16)`` unless it has no rows) of rows start … stop of ``q (N, n)``.
 
     Columns of coordinates that do not move the frame are zero. Returns the first row that is not finite, or −1.
     """
@@ -320,9 +339,15 @@ def chain_jacobians(model, q, start, stop, reference, out, poses):
     k = model.free.shape[0]
     buffer = lane_buffer(n)
     value = lane_buffer(1)
-    pose = lane_buffer(12)
+    pose = pose_buffer()
+    place = pose_places()
     axes = lane_buffer(6 * model.kind.shape[0])
-    jacobian = lane_buffer(6 * k)
+    jacobian = lane_buffer(6 * k + 1)
+    jacobian[6 * k * LANES :] = 0.0
+    where = np.full(6 * n, 6 * k * LANES)
+    for c in range(k):
+        for r in range(6):
+            where[r * n + model.free[c]] = (6 * c + r) * LANES
     bad = -1
     for first in range(start, stop, LANES):
         row = load_block(q, first, stop, buffer)
@@ -333,14 +358,6 @@ def chain_jacobians(model, q, start, stop, reference, out, poses):
         if reference != MIXED:
             turn_jacobian_block(pose, k, reference, jacobian)
         if poses.shape[0]:
-            store_pose(pose, first, stop, poses)
-        block = out[first : min(first + LANES, stop)]
-        if k < n:
-            block[:] = 0.0
-        for c in range(k):
-            column = model.free[c]
-            start_of_column = at(c, 6)
-            for lane in range(block.shape[0]):
-                for r in range(6):
-                    block[lane, r, column] = jacobian[start_of_column + r * LANES + lane]
+            store_block(pose, place, first, stop, poses, 0)
+        store_block(jacobian, where, first, stop, out, 0)
     return bad

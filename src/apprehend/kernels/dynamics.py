@@ -13,13 +13,13 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-from .chain import PRISMATIC, REVOLUTE, at, lane_buffer, load_block, within_sincos, wrap_angles
+from .chain import PRISMATIC, REVOLUTE, at, lane_buffer, load_block, store_block, within_sincos, wrap_angles
 from .lanes import LANES, sincos
 
 WIDTH = 27
 
 
-@kernel
+@kernel(borrow=True)
 def _turned(place, i, q, coordinate, multiplier, offset, state):
     """Rotation and place of revolute joint i in its parent's frame."""
     L = LANES
@@ -45,7 +45,7 @@ def _turned(place, i, q, coordinate, multiplier, offset, state):
         state[t + 11 * L + lane] = z
 
 
-@kernel
+@kernel(borrow=True)
 def _shifted(place, i, q, coordinate, multiplier, offset, state):
     """Rotation and place of prismatic joint i in its parent's frame."""
     L = LANES
@@ -62,12 +62,13 @@ def _shifted(place, i, q, coordinate, multiplier, offset, state):
             state[t + (9 + k) * L + lane] = origin + axis * (multiplier * q[d + lane] + offset)
 
 
-@kernel
+@kernel(borrow=True)
 def _accelerate(i, parent, turning, multiplier, qd, qdd, coordinate, carrier, state):
     """Angular velocity and acceleration of joint i and acceleration of its origin, from its parent's.
 
     *turning* is 1 for a revolute joint and 0 for a prismatic one; speed and acceleration are *multiplier* times those of
-    its *coordinate*. The parent's part goes through *carrier* (9): see `carry_block`.
+    its *coordinate*. The parent's part goes through *carrier* (9): a loop on one array at
+    two offsets known at run time does not vectorise.
     """
     L = LANES
     t = at(i, WIDTH)
@@ -118,7 +119,7 @@ def _accelerate(i, parent, turning, multiplier, qd, qdd, coordinate, carrier, st
         state[t + 20 * L + lane] = r02 * bx + r12 * by + r22 * bz + sliding * rate_rate
 
 
-@kernel
+@kernel(borrow=True)
 def _load(i, inertia, state):
     """Force and moment that move the body of joint i as it moves (Newton and Euler about the frame's origin)."""
     L = LANES
@@ -151,7 +152,7 @@ def _load(i, inertia, state):
         state[t + 26 * L + lane] = xz * ax + yz * ay + zz * az + wx * ly - wy * lx + hx * by - hy * bx
 
 
-@kernel
+@kernel(borrow=True)
 def _hand_down(i, parent, multiplier, armature, turning, qdd, coordinate, load, state, tau):
     """Add joint i's torque to *tau* at its coordinate, and its force and moment, through *load* (6), to its parent's."""
     L = LANES
@@ -194,7 +195,7 @@ def _hand_down(i, parent, multiplier, armature, turning, qdd, coordinate, load, 
         state[s + 21 * L + c] += load[c]
 
 
-@kernel
+@kernel(borrow=True)
 def inverse_block(model, q, qd, qdd, gravity, scratch, state, tau):
     """Torques ``tau (n * LANES)`` of one block; ``scratch (9 * LANES)``, ``state ((m + 1) * WIDTH * LANES)``."""
     L = LANES
@@ -246,6 +247,7 @@ def inverse_dynamics(model, q, qd, qdd, gravity, start, stop, out):
     scratch = lane_buffer(9)
     state = lane_buffer((m + 1) * WIDTH)
     tau = lane_buffer(n)
+    where = np.arange(n) * LANES
     bad = -1
     for first in range(start, stop, LANES):
         row = load_block(q, first, stop, bq)
@@ -260,7 +262,5 @@ def inverse_dynamics(model, q, qd, qdd, gravity, start, stop, out):
             if row >= 0 and bad < 0:
                 bad = 4 * row + 3
         inverse_block(model, bq, bqd, bqdd, gravity, scratch, state, tau)
-        for lane in range(min(LANES, stop - first)):
-            for j in range(n):
-                out[first + lane, j] = tau[j * LANES + lane]
+        store_block(tau, where, first, stop, out, 0)
     return bad

@@ -58,12 +58,12 @@ def sincos(x):  # type: ignore[no-untyped-def]
             )
         )
     )
-    quadrant = k - 4.0 * math.floor(k * 0.25)
-    odd = quadrant - 2.0 * math.floor(quadrant * 0.5)
-    sign_s = 1.0 - 2.0 * math.floor(quadrant * 0.5)
-    half = math.floor((quadrant + 1.0) * 0.5)
-    sign_c = 1.0 - 2.0 * (half - 2.0 * math.floor(half * 0.5))
-    return (c * odd + s * (1.0 - odd)) * sign_s, (s * odd + c * (1.0 - odd)) * sign_c
+    half = math.floor(0.5 * k)
+    odd = k != 2.0 * half
+    down = half != 2.0 * math.floor(0.5 * half)
+    sine = c if odd else s
+    cosine = s if odd else c
+    return -sine if down else sine, -cosine if down != odd else cosine
 
 
 @kernel

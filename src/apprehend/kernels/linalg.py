@@ -6,8 +6,6 @@ The lower triangle of a symmetric n × n matrix is packed row by row: entry (i, 
 
 from __future__ import annotations
 
-import numpy as np
-
 from ._jit import kernel
 from .lanes import LANES
 
@@ -18,13 +16,12 @@ def entry(i, j):
     return ((i * (i + 1) // 2 + j) * LANES) & 0x7FFFFFFF
 
 
-@kernel
+@kernel(borrow=True)
 def factor_block(A, n, scratch):
     """Factor ``A = L D Lᵀ`` in place (unit lower L, D on the diagonal); A is a packed triangle, *scratch* (1) on lanes.
 
     Sums gather in *scratch*: a loop that reads and writes one array at offsets known at run time does not vectorise.
     """
-    factor = np.empty(LANES)
     for i in range(n):
         ii = entry(i, i)
         for j in range(i):
@@ -42,23 +39,24 @@ def factor_block(A, n, scratch):
         for lane in range(LANES):
             scratch[lane] = A[ii + lane]
         for j in range(i):
-            _scale(A, entry(i, j), entry(j, j), scratch, factor)
+            _scale(A, entry(i, j), entry(j, j), scratch)
         for lane in range(LANES):
             A[ii + lane] = scratch[lane]
 
 
-@kernel
-def _scale(A, ij, jj, diagonal, factor):
+@kernel(borrow=True)
+def _scale(A, ij, jj, diagonal):
     """Turn entry ij of L D into L and take its part off the diagonal of its row."""
+    ij = ij & 0x7FFFFFFF
+    jj = jj & 0x7FFFFFFF
     for lane in range(LANES):
-        factor[lane] = A[ij + lane] / A[jj + lane]
-    for lane in range(LANES):
-        diagonal[lane] -= factor[lane] * A[ij + lane]
-    for lane in range(LANES):
-        A[ij + lane] = factor[lane]
+        before = A[ij + lane]
+        factor = before / A[jj + lane]
+        diagonal[lane] -= factor * before
+        A[ij + lane] = factor
 
 
-@kernel
+@kernel(borrow=True)
 def solve_block(A, n, x, scratch):
     """Solve in place for ``x (n * LANES)`` with the factors that `factor_block` left in *A*; *scratch* (1) on lanes."""
     for i in range(n):

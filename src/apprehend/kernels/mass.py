@@ -9,14 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-from .chain import REVOLUTE, at, lane_buffer, load_block
+from .chain import REVOLUTE, at, lane_buffer, load_block, store_block
 from .dynamics import WIDTH, inverse_block
 from .lanes import LANES
 from .linalg import entry, factor_block, solve_block
 from .tree import tree_through
 
 
-@kernel
+@kernel(borrow=True)
 def _inertia_in_world(i, inertia, origin, poses, composite):
     """The ten inertia parameters of joint i's body about *origin*, in axes of the world."""
     L = LANES
@@ -69,7 +69,7 @@ def _inertia_in_world(i, inertia, origin, poses, composite):
         composite[t + 9 * L + lane] = c0 * r20 + c1 * r21 + c2 * r22 + x * sx + y * sy
 
 
-@kernel
+@kernel(borrow=True)
 def _axis_and_momentum(i, turning, origin, poses, composite, screw):
     """Unit twist of joint i about *origin*, and the momentum that it gives to all that it carries; 12 components."""
     L = LANES
@@ -112,7 +112,7 @@ def _axis_and_momentum(i, turning, origin, poses, composite, screw):
         screw[o + 11 * L + lane] = xz * wx + yz * wy + composite[t + 9 * L + lane] * wz + hx * vy - hy * vx
 
 
-@kernel(inline=True)
+@kernel(borrow=True)
 def mass_block(model, q, origin, scratch, poses, composite, screw, M):
     """Mass matrix of one block: a packed triangle (see `linalg`).
 
@@ -167,7 +167,7 @@ def mass_block(model, q, origin, scratch, poses, composite, screw, M):
 
 @kernel
 def mass_matrix(model, q, start, stop, out):
-    """Mass matrices ``out (N, n, n)`` of rows start … stop of ``q (N, n)``; returns the first row not finite, or −1."""
+    """Mass matrices ``out (N, n²)`` of rows start … stop of ``q (N, n)``; returns the first row not finite, or −1."""
     n = q.shape[1]
     m = model.kind.shape[0]
     buffer = lane_buffer(n)
@@ -179,20 +179,45 @@ def mass_matrix(model, q, start, stop, out):
     origin = np.zeros(3)
     if m:
         origin[:] = model.place[0, 9:12]
+    where = np.empty(n * n, dtype=np.int64)
+    for i in range(n):
+        for j in range(n):
+            where[i * n + j] = entry(max(i, j), min(i, j))
     bad = -1
     for first in range(start, stop, LANES):
         row = load_block(q, first, stop, buffer)
         if row >= 0 and bad < 0:
             bad = row
         mass_block(model, buffer, origin, scratch, poses, composite, screw, M)
-        block = out[first : min(first + LANES, stop)]
-        for lane in range(block.shape[0]):
-            for i in range(n):
-                for j in range(i + 1):
-                    value = M[entry(i, j) + lane]
-                    block[lane, i, j] = value
-                    block[lane, j, i] = value
+        store_block(M, where, first, stop, out, 0)
     return bad
+
+
+@kernel(borrow=True)
+def _keep_diagonal(M, n, size):
+    """The diagonal of a packed triangle, ``size (n)``."""
+    for i in range(n):
+        d = entry(i, i)
+        s = at(i, 1)
+        for lane in range(LANES):
+            size[s + lane] = M[d + lane]
+
+
+@kernel(borrow=True)
+def _without_inertia(M, n, size, lanes):
+    """First lane and pivot of a factored mass matrix that vanish against the diagonal *size* before; or −1, −1."""
+    count = 0.0
+    for i in range(n):
+        d = entry(i, i)
+        s = at(i, 1)
+        for lane in range(LANES):
+            count += 0.0 if M[d + lane] > 1e-14 * size[s + lane] else 1.0
+    if count > 0.0:
+        for lane in range(lanes):
+            for i in range(n):
+                if not M[entry(i, i) + lane] > 1e-14 * size[i * LANES + lane]:
+                    return lane, i
+    return -1, -1
 
 
 @kernel
@@ -217,6 +242,7 @@ def forward_dynamics(model, q, qd, tau, gravity, start, stop, out):
     screw = state[22 * m * LANES :]
     M = lane_buffer(n * (n + 1) // 2)
     size = lane_buffer(n)
+    where = np.arange(n) * LANES
     origin = np.zeros(3)
     if m:
         origin[:] = model.place[0, 9:12]
@@ -235,18 +261,14 @@ def forward_dynamics(model, q, qd, tau, gravity, start, stop, out):
             bad = 4 * row + 3
         inverse_block(model, bq, bqd, zero, gravity, scratch, state, bias)
         mass_block(model, bq, origin, scratch, poses, composite, screw, M)
-        for i in range(n):
-            d = entry(i, i)
-            for lane in range(LANES):
-                size[i * LANES + lane] = M[d + lane]
+        _keep_diagonal(M, n, size)
         factor_block(M, n, scratch)
         for j in range(n * LANES):
             btau[j] -= bias[j]
         solve_block(M, n, btau, scratch)
-        for lane in range(min(LANES, stop - first)):
-            for i in range(n):
-                if not M[entry(i, i) + lane] > 1e-14 * size[i * LANES + lane] and singular < 0:
-                    singular = first + lane
-                    coordinate = i
-                out[first + lane, i] = btau[i * LANES + lane]
+        store_block(btau, where, first, stop, out, 0)
+        if singular < 0:
+            lane, coordinate = _without_inertia(M, n, size, min(LANES, stop - first))
+            if lane >= 0:
+                singular = first + lane
     return bad, singular, coordinate

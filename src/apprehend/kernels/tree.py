@@ -32,7 +32,18 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .chain import PRISMATIC, REVOLUTE, at, lane_buffer, load_block, within_sincos, wrap_angles
+from .chain import (
+    PRISMATIC,
+    REVOLUTE,
+    at,
+    lane_buffer,
+    load_block,
+    pose_buffer,
+    pose_places,
+    store_block,
+    within_sincos,
+    wrap_angles,
+)
 from .lanes import LANES, sincos
 
 
@@ -50,97 +61,110 @@ class TreeModel(NamedTuple):
     armature: np.ndarray
 
 
-@kernel
-def carry_through(place, i, poses, parent, target, scratch):
-    """``poses[target] = poses[parent] · place[i]`` on lanes; poses are 12 components each, parent −1 is the world.
+@kernel(borrow=True)
+def place_of(place, i, poses, parent, pose):
+    """``pose = poses[parent] · place[i]`` on lanes, 12 components each; parent −1 is the world."""
+    L = LANES
+    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
+    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
+    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
+    x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    if parent < 0:
+        for k in range(12):
+            value = place[i, k]
+            for lane in range(L):
+                pose[k * L + lane] = value
+        return
+    s = at(parent, 12)
+    for lane in range(L):
+        for k in range(3):
+            a0 = poses[s + 3 * k * L + lane]
+            a1 = poses[s + (3 * k + 1) * L + lane]
+            a2 = poses[s + (3 * k + 2) * L + lane]
+            pose[3 * k * L + lane] = a0 * r00 + a1 * r10 + a2 * r20
+            pose[(3 * k + 1) * L + lane] = a0 * r01 + a1 * r11 + a2 * r21
+            pose[(3 * k + 2) * L + lane] = a0 * r02 + a1 * r12 + a2 * r22
+            pose[(9 + k) * L + lane] = poses[s + (9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
 
-    The parent goes through *scratch* (12): a loop on one array at two offsets known at run time does not vectorise.
+
+@kernel(inline=True)
+def revolve_through(place, i, q, coordinate, multiplier, offset, pose, poses):
+    """Move ``pose (12)`` through ``place[i]`` and a rotation about z by ``multiplier * q[coordinate] + offset``.
+
+    The result is also ``poses[i]``.
     """
     L = LANES
     r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
     r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
     r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
     x, y, z = place[i, 9], place[i, 10], place[i, 11]
-    t = at(target, 12)
-    if parent < 0:
-        for k in range(12):
-            value = place[i, k]
-            for lane in range(L):
-                poses[t + k * L + lane] = value
-        return
-    s = at(parent, 12)
-    for c in range(12 * L):
-        scratch[c] = poses[s + c]
-    for lane in range(L):
-        for k in range(3):
-            a0 = scratch[3 * k * L + lane]
-            a1 = scratch[(3 * k + 1) * L + lane]
-            a2 = scratch[(3 * k + 2) * L + lane]
-            p = scratch[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
-            poses[t + 3 * k * L + lane] = a0 * r00 + a1 * r10 + a2 * r20
-            poses[t + (3 * k + 1) * L + lane] = a0 * r01 + a1 * r11 + a2 * r21
-            poses[t + (3 * k + 2) * L + lane] = a0 * r02 + a1 * r12 + a2 * r22
-            poses[t + (9 + k) * L + lane] = p
-
-
-@kernel
-def carry_block(place, i, poses, parent, target):
-    """`carry_through` with a scratch of its own."""
-    carry_through(place, i, poses, parent, target, np.empty(12 * LANES))
-
-
-@kernel
-def turn_block(q, coordinate, multiplier, offset, poses, target):
-    """Rotate ``poses[target]`` by ``multiplier * q[coordinate] + offset`` about its own z."""
-    L = LANES
-    t = at(target, 12)
+    t = at(i, 12)
     d = at(coordinate, 1)
     for lane in range(L):
         s, c = sincos(multiplier * q[d + lane] + offset)
         for k in range(3):
-            b0 = poses[t + 3 * k * L + lane]
-            b1 = poses[t + (3 * k + 1) * L + lane]
-            poses[t + 3 * k * L + lane] = b0 * c + b1 * s
-            poses[t + (3 * k + 1) * L + lane] = b1 * c - b0 * s
+            a0 = pose[3 * k * L + lane]
+            a1 = pose[(3 * k + 1) * L + lane]
+            a2 = pose[(3 * k + 2) * L + lane]
+            b0 = a0 * r00 + a1 * r10 + a2 * r20
+            b1 = a0 * r01 + a1 * r11 + a2 * r21
+            b2 = a0 * r02 + a1 * r12 + a2 * r22
+            p = pose[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
+            a0 = b0 * c + b1 * s
+            a1 = b1 * c - b0 * s
+            pose[3 * k * L + lane] = a0
+            pose[(3 * k + 1) * L + lane] = a1
+            pose[(3 * k + 2) * L + lane] = b2
+            pose[(9 + k) * L + lane] = p
+            poses[t + 3 * k * L + lane] = a0
+            poses[t + (3 * k + 1) * L + lane] = a1
+            poses[t + (3 * k + 2) * L + lane] = b2
+            poses[t + (9 + k) * L + lane] = p
 
 
-@kernel
-def shift_block(q, coordinate, multiplier, offset, poses, target):
-    """Translate ``poses[target]`` by ``multiplier * q[coordinate] + offset`` along its own z."""
-    L = LANES
-    t = at(target, 12)
-    d = at(coordinate, 1)
-    for lane in range(L):
-        h = multiplier * q[d + lane] + offset
-        for k in range(3):
-            poses[t + (9 + k) * L + lane] += h * poses[t + (3 * k + 2) * L + lane]
-
-
-@kernel
-def revolve_through(place, i, q, coordinate, multiplier, offset, poses, parent, scratch):
-    """`carry_through` and `turn_block` in one pass, for a joint i with a parent joint."""
+@kernel(inline=True)
+def slide_through(place, i, q, coordinate, multiplier, offset, pose, poses):
+    """As `revolve_through`, for a translation along z."""
     L = LANES
     r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
     r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
     r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
     x, y, z = place[i, 9], place[i, 10], place[i, 11]
     t = at(i, 12)
-    p = at(parent, 12)
     d = at(coordinate, 1)
-    for c in range(12 * L):
-        scratch[c] = poses[p + c]
     for lane in range(L):
-        s, c = sincos(multiplier * q[d + lane] + offset)
+        h = multiplier * q[d + lane] + offset
         for k in range(3):
-            a0 = scratch[3 * k * L + lane]
-            a1 = scratch[(3 * k + 1) * L + lane]
-            a2 = scratch[(3 * k + 2) * L + lane]
+            a0 = pose[3 * k * L + lane]
+            a1 = pose[(3 * k + 1) * L + lane]
+            a2 = pose[(3 * k + 2) * L + lane]
             b0 = a0 * r00 + a1 * r10 + a2 * r20
             b1 = a0 * r01 + a1 * r11 + a2 * r21
-            poses[t + 3 * k * L + lane] = b0 * c + b1 * s
-            poses[t + (3 * k + 1) * L + lane] = b1 * c - b0 * s
-            poses[t + (3 * k + 2) * L + lane] = a0 * r02 + a1 * r12 + a2 * r22
-            poses[t + (9 + k) * L + lane] = scratch[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
+            b2 = a0 * r02 + a1 * r12 + a2 * r22
+            p = pose[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z + b2 * h
+            pose[3 * k * L + lane] = b0
+            pose[(3 * k + 1) * L + lane] = b1
+            pose[(3 * k + 2) * L + lane] = b2
+            pose[(9 + k) * L + lane] = p
+            poses[t + 3 * k * L + lane] = b0
+            poses[t + (3 * k + 1) * L + lane] = b1
+            poses[t + (3 * k + 2) * L + lane] = b2
+            poses[t + (9 + k) * L + lane] = p
+
+
+@kernel(borrow=True)
+def begin_at(parent, poses, pose):
+    """``pose (12)`` becomes the parent joint's moved frame, or the world (−1)."""
+    L = LANES
+    if parent < 0:
+        for k in range(12):
+            one = 1.0 if k == 0 or k == 4 or k == 8 else 0.0
+            for lane in range(L):
+                pose[k * L + lane] = one
+    else:
+        s = at(parent, 12)
+        for c in range(12 * L):
+            pose[c] = poses[s + c]
 
 
 @kernel
@@ -149,7 +173,7 @@ def tree_block(model, q, value, poses):
     tree_through(model, q, value, lane_buffer(12), poses)
 
 
-@kernel(inline=True)
+@kernel(borrow=True)
 def tree_through(model, q, value, scratch, poses):
     """Moved frames of all joints, ``poses (12 * m * LANES)``, of ``q (n * LANES)``.
 
@@ -163,50 +187,45 @@ def tree_through(model, q, value, scratch, poses):
     place = model.place
     for i in range(kind.shape[0]):
         parent = parents[i]
+        if parent < 0 or parent != i - 1:
+            begin_at(parent, poses, scratch)
         if kind[i] == PRISMATIC:
-            carry_through(place, i, poses, parent, i, scratch)
-            shift_block(q, coordinate[i], gain[i, 0], gain[i, 1], poses, i)
-        elif not near:
-            wrap_angles(q, coordinate[i], gain[i, 0], gain[i, 1], value)
-            carry_through(place, i, poses, parent, i, scratch)
-            turn_block(value, 0, 1.0, 0.0, poses, i)
-        elif parent < 0:
-            carry_through(place, i, poses, parent, i, scratch)
-            turn_block(q, coordinate[i], gain[i, 0], gain[i, 1], poses, i)
+            slide_through(place, i, q, coordinate[i], gain[i, 0], gain[i, 1], scratch, poses)
+        elif near:
+            revolve_through(place, i, q, coordinate[i], gain[i, 0], gain[i, 1], scratch, poses)
         else:
-            revolve_through(place, i, q, coordinate[i], gain[i, 0], gain[i, 1], poses, parent, scratch)
+            wrap_angles(q, coordinate[i], gain[i, 0], gain[i, 1], value)
+            revolve_through(place, i, value, 0, 1.0, 0.0, scratch, poses)
 
 
 @kernel
 def tree_poses(model, q, start, stop, out):
-    """Poses of all frames, ``out (N, F, 16)``, of rows start … stop of ``q (N, n)``.
+    """Poses of all frames, ``out (N, 16 F)``, of rows start … stop of ``q (N, n)``.
 
     Returns the first row that is not finite, or −1.
     """
     m = model.kind.shape[0]
     buffer = lane_buffer(q.shape[1])
     value = lane_buffer(1)
-    scratch = lane_buffer(12)
-    poses = lane_buffer(12 * (m + 1))
-    frame = m
+    poses = lane_buffer(12 * m)
+    pose = pose_buffer()
+    where = pose_places()
     bad = -1
     for first in range(start, stop, LANES):
         row = load_block(q, first, stop, buffer)
         if row >= 0 and bad < 0:
             bad = row
-        tree_through(model, buffer, value, scratch, poses)
-        for f in range(model.frame_joint.shape[0]):
-            carry_through(model.frame_place, f, poses, model.frame_joint[f], frame, scratch)
-            t = 12 * frame * LANES
-            for lane in range(min(LANES, stop - first)):
-                target = out[first + lane, f]
-                for k in range(3):
-                    for j in range(3):
-                        target[4 * k + j] = poses[t + (3 * k + j) * LANES + lane]
-                    target[4 * k + 3] = poses[t + (9 + k) * LANES + lane]
-                    target[12 + k] = 0.0
-                target[15] = 1.0
+        tree_through(model, buffer, value, pose, poses)
+        _store_frames(model, poses, pose, where, first, stop, out)
     return bad
+
+
+@kernel(borrow=True)
+def _store_frames(model, poses, pose, where, first, count, out):
+    """Poses of all frames of one block into rows of *out*."""
+    for f in range(model.frame_joint.shape[0]):
+        place_of(model.frame_place, f, poses, model.frame_joint[f], pose)
+        store_block(pose, where, first, count, out, 16 * f)
 
 
 @kernel
@@ -278,28 +297,38 @@ def centers_of_mass(model, q, start, stop, out):
     poses = lane_buffer(12 * m)
     total = lane_buffer(3)
     inertia = model.inertia
-    mass = inertia[:, 0].sum()
+    where = np.arange(3) * L
     bad = -1
     for first in range(start, stop, L):
         row = load_block(q, first, stop, buffer)
         if row >= 0 and bad < 0:
             bad = row
         tree_through(model, buffer, value, scratch, poses)
-        for k in range(3):
-            for lane in range(L):
-                total[k * L + lane] = inertia[m, 1 + k]
-        for i in range(m):
-            t = at(i, 12)
-            w, x, y, z = inertia[i, 0], inertia[i, 1], inertia[i, 2], inertia[i, 3]
-            for lane in range(L):
-                for k in range(3):
-                    total[k * L + lane] += (
-                        w * poses[t + (9 + k) * L + lane]
-                        + x * poses[t + 3 * k * L + lane]
-                        + y * poses[t + (3 * k + 1) * L + lane]
-                        + z * poses[t + (3 * k + 2) * L + lane]
-                    )
-        for lane in range(min(L, stop - first)):
-            for k in range(3):
-                out[first + lane, k] = total[k * L + lane] / mass
+        _moments_of_mass(inertia, poses, total)
+        store_block(total, where, first, stop, out, 0)
     return bad
+
+
+@kernel(borrow=True)
+def _moments_of_mass(inertia, poses, total):
+    """Centre of mass in the world of one block, ``total (3)``."""
+    L = LANES
+    m = inertia.shape[0] - 1
+    mass = inertia[m, 0]
+    for k in range(3):
+        for lane in range(L):
+            total[k * L + lane] = inertia[m, 1 + k]
+    for i in range(m):
+        t = at(i, 12)
+        w, x, y, z = inertia[i, 0], inertia[i, 1], inertia[i, 2], inertia[i, 3]
+        mass += w
+        for lane in range(L):
+            for k in range(3):
+                total[k * L + lane] += (
+                    w * poses[t + (9 + k) * L + lane]
+                    + x * poses[t + 3 * k * L + lane]
+                    + y * poses[t + (3 * k + 1) * L + lane]
+                    + z * poses[t + (3 * k + 2) * L + lane]
+                )
+    for c in range(3 * L):
+        total[c] /= mass

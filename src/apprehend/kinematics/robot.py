@@ -192,7 +192,7 @@ class Robot:
         count = math.prod(q.shape[:-1])
         rows = q.reshape(count, self.n)
         if frame is None:
-            out = memory.empty(count, len(self.frame_names), 16)
+            out = memory.empty(count, 16 * len(self.frame_names))
             tree = self.model
             self._batch(lambda a, b: tree_kernels.tree_poses(tree, rows, a, b, out), q, count)
             return out.reshape(*q.shape[:-1], len(self.frame_names), 4, 4)
@@ -238,7 +238,7 @@ class Robot:
         count = math.prod(q.shape[:-1])
         rows = q.reshape(count, self.n)
         T = memory.empty(count, 16) if poses else _NO_POSES
-        J = memory.empty(count, 6, self.n)
+        J = memory.empty(count, 6 * self.n)
         self._batch(lambda a, b: chain_kernels.chain_jacobians(chain, rows, a, b, kind, J, T), q, count)
         return J.reshape(*q.shape[:-1], 6, self.n), T.reshape(*q.shape[:-1], 4, 4) if poses else T
 
@@ -265,7 +265,7 @@ class Robot:
         """Joint-space inertia M(q), ``(..., n, n)``, symmetric (composite rigid bodies)."""
         q = self._read(q)
         count = math.prod(q.shape[:-1])
-        out = memory.empty(count, self.n, self.n)
+        out = memory.empty(count, self.n * self.n)
         if dynamics.mass_matrix(self.model, q.reshape(count, self.n), out) >= 0:
             self._refuse(q)
         return out.reshape(*q.shape[:-1], self.n, self.n)
