@@ -145,6 +145,16 @@ def test_tolerances_per_axis() -> None:
     assert loose.starts.mean() <= position.starts.mean() + 2
 
 
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-4, 1e-3])
+def test_six_equal_tolerances_are_as_quick_as_one_number(tolerance: float) -> None:
+    robot = chain("RRRRRRR", seed=5)
+    T = robot.fk(configurations(robot, 300), "tip")
+    boxed = ik.solve(robot, T, "tip", tolerance=np.full(6, tolerance))
+    plain = ik.solve(robot, T, "tip", tolerance=tolerance)
+    assert boxed.success.all()
+    assert boxed.starts.mean() <= plain.starts.mean() + 1.0
+
+
 def test_out_of_reach_is_certified_and_told_apart() -> None:
     robot = chain("RRRRRR", seed=4)
     T = robot.fk(configurations(robot, 3), "tip")

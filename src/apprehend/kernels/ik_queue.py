@@ -19,6 +19,7 @@ from .ik_chain import (
     ERR,
     FLAG,
     PAST,
+    SIN,
     TARGET,
     WORK,
     L,
@@ -95,8 +96,13 @@ def is_new(chain, q, l, found, count, distinct):
 def evaluate(chain, q, axes, w, tolerance, partial, free_axis):
     """Pose, error and flags of all lanes."""
     forward(chain, q, axes, w)
+    if partial:  # stalling is judged by the error in the box: the whole pose's must not move the mark
+        for l in range(L):
+            w[SIN + l] = w[PAST + l]
     pose_error(w, tolerance[0], tolerance[3])
     if partial:
+        for l in range(L):
+            w[PAST + l] = w[SIN + l]
         box_error(w, chain.tool, tolerance, free_axis)
 
 
