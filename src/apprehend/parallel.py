@@ -8,13 +8,16 @@ contiguous range of problems, and nothing is summed across threads.
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 
 from .errors import InputError
 
 _pool: ThreadPoolExecutor | None = None
+_helping = 0
 _threads = 0
+_this = threading.local()
 
 
 def _cores() -> int:
@@ -31,29 +34,42 @@ def threads() -> int:
 
 def set_threads(n: int) -> None:
     """Use *n* threads from now on."""
-    global _threads, _pool
+    global _threads
     if n < 1:
         raise InputError(f"threads is {n}; expected 1 or more")
-    if _pool is not None:
-        _pool.shutdown()
-        _pool = None
     _threads = n
 
 
 def over_ranges(work: Callable[[int, int], object], count: int, grain: int = 1) -> None:
     """Call ``work(start, stop)`` on contiguous ranges that cover ``range(count)``, on several threads.
 
-    *grain* is the smallest range worth a thread of its own; a batch below two grains runs in the caller's thread.
-    An exception in any range is raised here.
+    *grain* is the smallest range worth a thread of its own; the first range, and all of a batch below two grains, runs
+    in the caller's thread, and so does all that is asked for within a range. An exception in any range is
+    raised here.
     """
-    global _pool
     parts = min(threads(), max(1, count // max(grain, 1)))
-    if parts <= 1:
+    if parts <= 1 or getattr(_this, "helps", False):
         work(0, count)
         return
-    if _pool is None:
-        _pool = ThreadPoolExecutor(max_workers=_threads, thread_name_prefix="apprehend")
+    pool = _helpers(parts - 1)
     edges = [count * i // parts for i in range(parts + 1)]
-    futures = [_pool.submit(work, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    futures = [pool.submit(_help, work, a, b) for a, b in zip(edges[1:-1], edges[2:], strict=True)]
+    try:
+        work(edges[0], edges[1])
+    finally:
+        wait(futures)
     for future in futures:
         future.result()
+
+
+def _help(work: Callable[[int, int], object], start: int, stop: int) -> None:
+    _this.helps = True
+    work(start, stop)
+
+
+def _helpers(n: int) -> ThreadPoolExecutor:
+    """A pool of at least *n* threads, which lives on from call to call."""
+    global _pool, _helping
+    if _pool is None or _helping < n:
+        _pool, _helping = ThreadPoolExecutor(max_workers=n, thread_name_prefix="apprehend"), n
+    return _pool

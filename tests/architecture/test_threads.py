@@ -37,3 +37,23 @@ def test_an_exception_in_a_range_is_raised() -> None:
 def test_zero_threads_is_refused() -> None:
     with pytest.raises(InputError, match="threads is 0"):
         parallel.set_threads(0)
+
+
+def test_ranges_within_ranges_do_not_wait_for_each_other() -> None:
+    before = parallel.threads()
+    parallel.set_threads(2)
+    try:
+        hits = np.zeros((4, 100), dtype=int)
+
+        def outer(a: int, b: int) -> None:
+            for row in range(a, b):
+
+                def inner(c: int, d: int, row: int = row) -> None:
+                    hits[row, c:d] += 1
+
+                parallel.over_ranges(inner, 100)
+
+        parallel.over_ranges(outer, 4)
+        assert (hits == 1).all()
+    finally:
+        parallel.set_threads(before)

@@ -337,8 +337,10 @@ class Robot:
         rows = []
         for name in values:
             if name in given:
-                spread = np.ascontiguousarray(np.broadcast_to(given[name], (*shape, self.n)))
-                rows.append(self._read(spread.reshape(math.prod(shape), self.n)))
+                array = given[name]
+                if array.shape[:-1] != shape:
+                    array = np.broadcast_to(array, (*shape, self.n)).copy()
+                rows.append(array.reshape(math.prod(shape), self.n))
             else:
                 rows.append(dynamics.NONE)
         return shape, rows
