@@ -9,6 +9,8 @@ from apprehend import ik
 from apprehend.errors import InputError, UnknownNameError
 from apprehend.ik.step import assemble
 from apprehend.kernels.ik_priority import brake, prioritised, priority_work
+from apprehend.kernels.ik_saturate import saturate_work
+from apprehend.kernels.ik_step import steps_block
 from apprehend.kernels.ik_tasks import task_block
 from apprehend.kernels.lanes import LANES
 from apprehend.kernels.tree import tree_block
@@ -126,55 +128,98 @@ def test_tasks_converge_to_what_they_say() -> None:
     assert np.allclose(q, goal, atol=1e-3)
 
 
-def random_problem(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+Problem = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def random_problems(rng: np.random.Generator) -> tuple[np.ndarray, list[Problem]]:
+    """Levels, and for every lane a Jacobian, errors and bounds."""
     n = int(rng.integers(3, 10))
     sizes = rng.integers(1, 5, int(rng.integers(1, 4)))
     levels = np.cumsum([0, *sizes]).astype(np.int64)
-    J = rng.normal(size=(levels[-1], n))
-    if rng.random() < 0.4 and len(sizes) > 1:  # a row that depends on those above
-        J[levels[1]] = J[0] * 0.5
-    if rng.random() < 0.3:
-        J[-1] = 0.0
-    lower = -rng.uniform(0.0, 1.0, n) * (rng.random(n) < 0.9)
-    upper = rng.uniform(0.0, 1.0, n) * (rng.random(n) < 0.9)
-    return J, rng.normal(size=levels[-1]) * 2.0, levels, lower, upper
+    made = []
+    for _ in range(LANES):
+        J = rng.normal(size=(levels[-1], n))
+        if rng.random() < 0.2 and len(sizes) > 1:  # a row that depends on those above
+            J[levels[1]] = J[0] * 0.5
+        if rng.random() < 0.2:
+            J[-1] = 0.0
+        lower = -rng.uniform(0.0, 1.0, n) * (rng.random(n) < 0.9)
+        upper = rng.uniform(0.0, 1.0, n) * (rng.random(n) < 0.9)
+        made.append((J, rng.normal(size=levels[-1]) * 2.0, lower, upper))
+    return levels, made
+
+
+def on_lanes(levels: np.ndarray, made: list[Problem], damping: float) -> tuple[np.ndarray, np.ndarray]:
+    """Steps ``(LANES, n)`` of `steps_block`, and which of them it says not to use."""
+    n = made[0][0].shape[1]
+    J, e, low, high = (np.ascontiguousarray(np.stack(part, axis=-1)).reshape(-1) for part in zip(*made, strict=True))
+    rows = J.size // (n * LANES)
+    dq, N, A, H = np.empty(n * LANES), np.empty(n * n * LANES), np.empty(rows * n * LANES), np.empty(n * n * LANES)
+    rest, z, y, u = np.empty(rows * LANES), np.empty(n * LANES), np.empty(n * LANES), np.empty(n * LANES)
+    irregular = np.empty(LANES)
+    steps_block(
+        J, e, levels, damping, low, high, n, dq, N, A, H, rest, z, y, u, saturate_work(n), irregular
+    )  # fmt: skip
+    return dq.reshape(n, LANES).T, irregular
+
+
+def best_by_clarabel(
+    clarabel: object,
+    here: np.ndarray,
+    above: np.ndarray,
+    target: np.ndarray,
+    before: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    damping: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The level's quadratic form, and its minimiser with the rows above as they are."""
+    from scipy import sparse
+
+    n = before.size
+    P = here.T @ here + damping * np.eye(n)
+    f = -here.T @ target - damping * before
+    _U, s, Vt = np.linalg.svd(above) if above.size else (None, np.zeros(0), np.eye(n))
+    E = Vt[: int((s > 1e-9).sum())]
+    A = sparse.csc_matrix(np.vstack([E, np.eye(n), -np.eye(n)]))
+    b = np.concatenate([E @ before, upper, -lower])
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    cones = [clarabel.ZeroConeT(len(E)), clarabel.NonnegativeConeT(2 * n)]
+    solver = clarabel.DefaultSolver(sparse.csc_matrix(np.triu(P)), f, A, b, cones, settings)
+    return P, f, np.array(solver.solve().x)
 
 
 def test_every_level_is_optimal_against_a_qp_solver() -> None:
-    """Level by level: minimise the damped residual with the higher residuals fixed, by an independent solver."""
+    """Level by level: minimise the damped residual with the higher residuals fixed, by an independent solver; on lanes,
+    and by the active-set method for one."""
     clarabel = pytest.importorskip("clarabel")
-    from scipy import sparse
-
     rng = np.random.default_rng(0)
     damping = 1e-4
-    for _ in range(150):
-        J, e, levels, lower, upper = random_problem(rng)
-        n = J.shape[1]
+    regular = count = 0
+    for _ in range(10):
+        levels, made = random_problems(rng)
+        n = made[0][0].shape[1]
+        before = [[np.clip(0.0, lower, upper)] * 2 for _J, _e, lower, upper in made]
         for depth in range(1, len(levels)):
-            dq = np.empty(n)
-            prioritised(J, e, levels[: depth + 1], damping, lower, upper, dq, priority_work(n, J.shape[0]))
-            assert (dq >= lower).all()
-            assert (dq <= upper).all()
-            if depth == 1:
-                before = np.clip(0.0, lower, upper)
-            above, here = J[: levels[depth - 1]], J[levels[depth - 1] : levels[depth]]
-            assert np.abs(above @ (dq - before)).max(initial=0.0) < 1e-9
-            target = e[levels[depth - 1] : levels[depth]]
-            P = here.T @ here + damping * np.eye(n)
-            f = -here.T @ target - damping * before
-            _U, s, Vt = np.linalg.svd(above) if above.size else (None, np.zeros(0), np.eye(n))
-            E = Vt[: int((s > 1e-9).sum())]
-            A = sparse.csc_matrix(np.vstack([E, np.eye(n), -np.eye(n)]))
-            b = np.concatenate([E @ before, upper, -lower])
-            settings = clarabel.DefaultSettings()
-            settings.verbose = False
-            cones = [clarabel.ZeroConeT(len(E)), clarabel.NonnegativeConeT(2 * n)]
-            solver = clarabel.DefaultSolver(sparse.csc_matrix(np.triu(P)), f, A, b, cones, settings)
-            x = np.array(solver.solve().x)
-            ours = 0.5 * dq @ P @ dq + f @ dq
-            theirs = 0.5 * x @ P @ x + f @ x
-            assert ours <= theirs + 1e-6 * (1.0 + abs(theirs))
-            before = dq
+            lanes, irregular = on_lanes(levels[: depth + 1], made, damping)
+            for i, (J, e, lower, upper) in enumerate(made):
+                one = np.empty(n)
+                prioritised(J, e, levels[: depth + 1], damping, lower, upper, one, priority_work(n, J.shape[0]))
+                above, here = J[: levels[depth - 1]], J[levels[depth - 1] : levels[depth]]
+                target = e[levels[depth - 1] : levels[depth]]
+                count += 1
+                regular += irregular[i] == 0.0
+                for way, dq in enumerate((one, lanes[i] if irregular[i] == 0.0 else one)):
+                    assert (dq >= lower).all()
+                    assert (dq <= upper).all()
+                    assert np.abs(above @ (dq - before[i][way])).max(initial=0.0) < 1e-9
+                    P, f, x = best_by_clarabel(clarabel, here, above, target, before[i][way], lower, upper, damping)
+                    ours = 0.5 * dq @ P @ dq + f @ dq
+                    theirs = 0.5 * x @ P @ x + f @ x
+                    assert ours <= theirs + 1e-6 * (1.0 + abs(theirs))
+                    before[i][way] = dq
+    assert regular > 0.6 * count  # rows that depend on others are left to the method for one
 
 
 def test_lanes_and_active_set_agree_and_nothing_is_ever_violated() -> None:
@@ -348,3 +393,56 @@ def test_bad_arguments_are_named() -> None:
         ik.track(robot, T, "tip", q)
     with pytest.raises(InputError, match="tolerance is 0"):
         ik.track(robot, T[None], "tip", q, tolerance=0)
+
+
+def test_bad_targets_are_named_for_one_and_in_batches() -> None:
+    robot = with_limits(chain("RRRRRRR"), 1.0, 5.0)
+    q = np.tile(robot.home, (40, 1))
+    T = np.tile(np.eye(4), (40, 1, 1))
+    bad = T.copy()
+    bad[33, 0, 3] = np.nan
+    with pytest.raises(InputError, match=r"PoseTask.T\[33, 0, 3\] is nan"):
+        ik.step(robot, q, [ik.PostureTask(q), ik.PoseTask("tip", bad)], 0.1)
+    skew = np.eye(4)
+    skew[0, 1] = 0.1
+    for task in (
+        ik.PoseTask("tip", skew),
+        ik.RelativeTask("tip", "base", skew),
+        ik.OrientationTask("tip", skew[:3, :3]),
+    ):
+        with pytest.raises(InputError, match=r"is not a rotation: RᵀR differs from 1 by 0.1"):
+            ik.step(robot, q[0], [task], 0.1)
+    with pytest.raises(InputError, match="is a reflection"):
+        ik.step(robot, q[0], [ik.OrientationTask("tip", -np.eye(3))], 0.1)
+    with pytest.raises(InputError, match="a last row other than"):
+        ik.step(robot, q[0], [ik.PoseTask("tip", np.ones((4, 4)))], 0.1)
+    for task, name in (
+        (ik.PositionTask("tip", [0, np.inf, 0]), "PositionTask.position"),
+        (ik.LookAtTask("tip", [0, np.nan, 0]), "LookAtTask.target"),
+        (ik.DirectionTask("tip", [0, np.nan, 0]), "DirectionTask.direction"),
+        (ik.ComTask([0, np.nan, 0]), "ComTask.position"),
+    ):
+        with pytest.raises(InputError, match=rf"{name}\[1\] is (nan|inf); every entry must be finite"):
+            ik.step(robot, q[0], [task], 0.1)
+    with pytest.raises(InputError, match=r"PostureTask.q\[2\] is nan"):
+        ik.step(robot, q[0], [ik.PostureTask(np.where(np.arange(7) == 2, np.nan, 0.0))], 0.1)
+    with pytest.raises(InputError, match=r"JointTask.values\[0\] is nan"):
+        ik.step(robot, q[0], [ik.JointTask(["j1"], [np.nan])], 0.1)
+    with pytest.raises(InputError, match="expected a sequence of names"):
+        ik.step(robot, q[0], [ik.JointTask("j1", [0.0])], 0.1)
+    with pytest.raises(InputError, match=r"q\[0, 3\] is nan"):
+        ik.step(robot, np.where(np.arange(7) == 3, np.nan, q[0]), [ik.PostureTask(q[0])], 0.1)
+    with pytest.raises(InputError, match=r"the gradient of DescentTask.cost\[0, 0\] is nan"):
+        ik.step(robot, q[0], [ik.DescentTask(lambda x: np.full_like(x, np.nan))], 0.1)
+
+
+def test_a_batch_of_targets_is_as_its_members_one_by_one() -> None:
+    robot = with_limits(two_arms(1), 1.0, 5.0)
+    q = configurations(robot, 20) * 0.5
+    T = robot.fk(configurations(robot, 20, 1), "left_tip")
+    posture = ik.PostureTask(configurations(robot, 20, 2), weight=0.0)
+    look = ik.LookAtTask("right_tip", T[:, :3, 3], weight=[1.0, 0.0])
+    every = ik.step(robot, q, [[ik.PoseTask("left_tip", T), look], posture], 0.05)
+    for i in range(20):
+        alone = [ik.PoseTask("left_tip", T[i]), ik.LookAtTask("right_tip", T[i, :3, 3], weight=(1.0, 0.0))]
+        assert np.allclose(ik.step(robot, q[i], [alone], 0.05), every[i], atol=1e-9)

@@ -69,9 +69,7 @@ def solve_frames(
         joined[:, fresh] = one.q[:, fresh]
         taken[chain.free] = True
     guesses = np.ascontiguousarray(np.stack([start, joined], axis=1))
-    data = np.zeros((count, F, 16))
-    data[..., :9] = poses[..., :3, :3].reshape(count, F, 9)
-    data[..., 9:12] = poses[..., :3, 3]
+    data = np.ascontiguousarray(poses.reshape(count, F, 16))
     tasks = TaskList(
         kind=np.full(F, POSE, dtype=np.int64),
         frame=np.array([(robot.frame_index(f), -1) for f in frames], dtype=np.int64),

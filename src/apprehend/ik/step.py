@@ -6,14 +6,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, IntArray, as_pose, as_shaped
+from ..arrays import Array, IntArray, as_array, as_pose, as_shaped
 from ..errors import InputError
 from ..kernels.ik_step import steps
-from ..kernels.ik_tasks import TaskList
+from ..kernels.ik_tasks import JOINTS, OUTSIDE, TaskList
 from ..kinematics import Robot
 from ..parallel import over_ranges
 from ..result import Result, Status
@@ -24,144 +25,204 @@ GRAIN = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
-    """A list of tasks in the form of the kernels."""
+class Structure:
+    """A list of tasks without their targets, in the form of the kernels."""
 
     tasks: TaskList
-    levels: IntArray
+    kept: IntArray  # rows with a weight
+    levels: IntArray  # first of these rows of every level, and the end
+    blank: Array  # (1, T, 16)
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A list of tasks with their targets."""
+
+    structure: Structure
     data: Array  # (N or 1, T, 16)
     goal: Array  # (N or 1, T, n)
 
+    @property
+    def tasks(self) -> TaskList:
+        """The tasks without their targets."""
+        return self.structure.tasks
 
-def assemble(robot: Robot, levels: Sequence[Task | Sequence[Task]], q: Array) -> Program:
-    """Tasks in order of priority (an inner sequence shares one level) as arrays for ``q (N, n)``."""
-    if not levels:
+
+Levels = Sequence[Task | Sequence[Task]]
+_structures: WeakKeyDictionary[Robot, dict[Any, Structure]] = WeakKeyDictionary()
+KEPT = 64
+"""Lists of tasks that are remembered for every robot."""
+
+
+def _members(level: Task | Sequence[Task]) -> Sequence[Task]:
+    members = (level,) if isinstance(level, Task) else level
+    for task in members:
+        if not isinstance(task, Task):
+            raise InputError(f"tasks holds {task!r}; expected tasks such as ik.PoseTask(frame, T)")
+    return members
+
+
+def structure_of(robot: Robot, levels: Sequence[Sequence[Task]]) -> Structure:
+    """The tasks without their targets, checked when a list of this kind is first seen."""
+    key = tuple([tuple([task._key() for task in level]) for level in levels])
+    known = _structures.get(robot)
+    if known is None:
+        known = _structures[robot] = {}
+    found = known.get(key)
+    if found is None:
+        if len(known) >= KEPT:
+            known.clear()
+        found = known[key] = _build(robot, levels)
+    return found
+
+
+def _build(robot: Robot, levels: Sequence[Sequence[Task]]) -> Structure:
+    if not any(levels):
         raise InputError("tasks is empty; give at least one task")
     rows: list[Rows] = []
     first = [0]
     for level in levels:
-        for task in _members(level):
-            if not isinstance(task, Task):
-                raise InputError(f"tasks holds {task!r}; expected tasks such as ik.PoseTask(frame, T)")
-            rows.append(task._rows(robot, q))
-        first.append(sum(r.weight.size for r in rows))
-    count = q.shape[0]
-    shared = all(r.data.shape[0] == 1 and (r.goal is None or r.goal.shape[0] == 1) for r in rows)
-    size = 1 if shared else count
-    data = np.empty((size, len(rows), 16))
-    goal = np.zeros((size, len(rows), robot.n))
-    for t, r in enumerate(rows):
-        for value in (r.data, r.goal):
-            if value is not None and value.shape[0] not in (1, count):
-                raise InputError(
-                    f"task {t} has a batch of {value.shape[0]} targets, but there are {count} joint vectors"
-                )
-        data[:, t] = r.data
-        if r.goal is not None:
-            goal[:, t] = r.goal
-    pick = [c for r in rows for c in (r.pick or (0,) * r.weight.size)]
+        rows.extend(task._rows(robot) for task in level)
+        first.append(sum(int((r.weight > 0.0).sum()) for r in rows))
+    weight = np.concatenate([r.weight for r in rows])
     tasks = TaskList(
         kind=np.array([r.kind for r in rows], dtype=np.int64),
         frame=np.array([r.frames for r in rows], dtype=np.int64),
         row=np.cumsum([0, *(r.weight.size for r in rows)], dtype=np.int64),
         point=np.array([r.point for r in rows]),
         axis=np.array([r.axis for r in rows]),
-        weight=np.concatenate([r.weight for r in rows]),
+        weight=weight,
         gain=np.array([r.gain for r in rows], dtype=np.float64),
-        pick=np.array(pick, dtype=np.int64),
+        pick=np.array([c for r in rows for c in (r.pick or (0,) * r.weight.size)], dtype=np.int64),
     )
-    return Program(tasks, np.array(first, dtype=np.int64), data, goal)
+    blank = np.array([[np.zeros(16) if r.blank is None else r.blank for r in rows]])
+    return Structure(tasks, np.flatnonzero(weight > 0.0), np.array(first, dtype=np.int64), blank)
+
+
+def assemble(robot: Robot, levels: Levels, q: Array) -> Program:
+    """Tasks in order of priority (an inner sequence shares one level) as arrays for ``q (N, n)``."""
+    lists = [_members(level) for level in levels]
+    structure = structure_of(robot, lists)
+    targets = [task._targets(robot, q) for level in lists for task in level]
+    count = q.shape[0]
+    size = 1
+    for t, target in enumerate(targets):
+        if target.shape[0] != 1:
+            if target.shape[0] != count:
+                raise InputError(
+                    f"task {t} has a batch of {target.shape[0]} targets, but there are {count} joint vectors"
+                )
+            size = count
+    data = structure.blank.repeat(size, axis=0)
+    goal = np.zeros((size, len(targets), robot.n))
+    t = 0
+    for level in lists:
+        for task in level:
+            if structure.tasks.kind[t] < JOINTS:
+                data[:, t, task.slot] = targets[t]
+            else:
+                goal[:, t] = targets[t]
+            t += 1
+    return Program(structure, data, goal)
+
+
+def _advance(robot: Robot, levels: Levels, program: Program, q: ArrayLike, velocity: ArrayLike | None, dt: float,
+             damping: float) -> Array:  # fmt: skip
+    """The step from q."""
+    rows, shape = _joint_vectors(robot, q)
+    limits = robot.limits
+    before, acceleration = rows, np.full(robot.n, np.inf)
+    if velocity is not None:
+        acceleration = limits.acceleration
+        before = np.ascontiguousarray(np.broadcast_to(as_shaped(velocity, "velocity", robot.n), shape))
+        before = before.reshape(-1, robot.n)
+    out = np.empty(rows.shape)
+    fault = np.zeros(1, dtype=np.int64)
+    model, structure = robot.model, program.structure
+
+    def work(first: int, last: int) -> None:
+        steps(
+            model, structure.tasks, structure.kept, structure.levels, program.data, program.goal, rows, before,
+            limits.lower, limits.upper, limits.velocity, acceleration, dt, damping, first, last, out, fault,
+        )  # fmt: skip
+
+    over_ranges(work, rows.shape[0], GRAIN)
+    if fault[0]:
+        _refuse(robot, levels, rows, int(fault[0]))
+    return out.reshape(shape)
+
+
+def _joint_vectors(robot: Robot, q: ArrayLike) -> tuple[Array, tuple[int, ...]]:
+    """``q (..., n)`` as rows ``(N, n)``, and its shape; the numbers are looked at by the kernel."""
+    array = np.asarray(q, dtype=np.float64, order="C") if isinstance(q, np.ndarray) else as_array(q, "q", finite=False)
+    if not array.flags.writeable:
+        array = array.copy()  # kernels would be compiled a second time for read-only arrays
+    if array.ndim == 0 or array.shape[-1] != robot.n:
+        as_shaped(array, "q", robot.n)
+    return array.reshape(-1, robot.n), array.shape
+
+
+def _refuse(robot: Robot, levels: Levels, rows: Array, fault: int) -> None:
+    """Say what is wrong with the joint vectors, or with a task's targets."""
+    if fault > 0:
+        task = [t for level in levels for t in _members(level)][fault - 1]
+        task._check(robot, rows)
+        raise InputError(f"the targets of task {fault - 1}, a {type(task).__name__}, are not valid")
+    as_array(rows, "q")
+    limits = robot.limits
+    over = (rows < limits.lower - OUTSIDE) | (rows > limits.upper + OUTSIDE)
+    at, joint = (int(i) for i in np.argwhere(over)[0])
+    raise InputError(
+        f"q of joint {robot.joint_names[joint]!r} is {rows[at, joint]:.6g}, outside its limits "
+        f"[{limits.lower[joint]:.6g}, {limits.upper[joint]:.6g}]; clip it with robot.limits.clip(q)"
+    )
+
+
+def _settings(dt: float, damping: float) -> tuple[float, float]:
+    """The time step, and the square of the damping."""
+    if not (math.isfinite(dt) and dt > 0.0):
+        raise InputError(f"dt is {dt}; expected a positive time in seconds")
+    if not (math.isfinite(damping) and damping >= 0.0):
+        raise InputError(f"damping is {damping}; expected a number from 0 on")
+    return float(dt), max(float(damping), 1e-7) ** 2
 
 
 class Stepper:
-    """`step` prepared for many calls: ``stepper(q)`` returns dq; targets may be moved between calls.
+    """`step` prepared for many calls with the same tasks: ``stepper(q)`` returns dq.
 
-    Reading and checking tasks costs more than solving them, so a control loop keeps one of these.
+    Targets are read once; `retarget` moves those of one task.
     """
 
-    def __init__(
-        self, robot: Robot, tasks: Sequence[Task | Sequence[Task]], dt: float, *, damping: float = 1e-3
-    ) -> None:
-        if not (math.isfinite(dt) and dt > 0.0):
-            raise InputError(f"dt is {dt}; expected a positive time in seconds")
-        if not (math.isfinite(damping) and damping >= 0.0):
-            raise InputError(f"damping is {damping}; expected a number from 0 on")
+    def __init__(self, robot: Robot, tasks: Levels, dt: float, *, damping: float = 1e-3) -> None:
         self.robot = robot
-        self.dt = float(dt)
-        self._levels = tasks
-        self._damping = max(float(damping), 1e-7) ** 2
+        self.dt, self._damping = _settings(dt, damping)
+        self._levels = [list(_members(level)) for level in tasks]
+        structure_of(robot, self._levels)
+        self._depends = any(isinstance(t, DescentTask) for level in self._levels for t in level)
         self._program: Program | None = None
-        self._depends = any(isinstance(t, DescentTask) for level in tasks for t in _members(level))
-        self._no_limit = np.full(robot.n, np.inf)
 
     def retarget(self, number: int, task: Task) -> None:
         """Replace the targets of task *number* (in order, inner sequences counted through) by those of *task*."""
-        program = self._program
-        flat = [t for level in self._levels for t in _members(level)]
-        if not 0 <= number < len(flat) or type(task) is not type(flat[number]):
-            kinds = ", ".join(type(t).__name__ for t in flat)
+        places = [(level, i) for level in self._levels for i in range(len(level))]
+        if not 0 <= number < len(places) or type(task) is not type(places[number][0][places[number][1]]):
+            kinds = ", ".join(type(level[i]).__name__ for level, i in places)
             raise InputError(f"task {number} cannot become a {type(task).__name__}; the tasks are {kinds}")
-        members = iter(range(len(flat)))
-        self._levels = [
-            [task if next(members) == number else t for t in _members(level)] for level in self._levels
-        ]  # fmt: skip
-        if program is not None and program.data.shape[0] == 1:
-            rows = task._rows(self.robot, self.robot.home[None])
-            if rows.data.shape[0] == 1 and (rows.goal is None or rows.goal.shape[0] == 1):
-                program.data[:, number] = rows.data
-                if rows.goal is not None:
-                    program.goal[:, number] = rows.goal
-                return
+        level, i = places[number]
+        level[i] = task
         self._program = None
 
     def __call__(self, q: ArrayLike, velocity: ArrayLike | None = None) -> Array:
         """The step dq ``(..., n)`` from ``q (..., n)``; *velocity*: see `step`."""
-        robot = self.robot
-        q = as_shaped(q, "q", robot.n)
-        shape = q.shape
-        rows = q.reshape(-1, robot.n)
-        limits = robot.limits
-        if (rows < limits.lower - 1e-9).any() or (rows > limits.upper + 1e-9).any():
-            self._refuse(rows)
-        if velocity is None:
-            before, acceleration = rows, self._no_limit
-        else:
-            acceleration = limits.acceleration
-            before = np.ascontiguousarray(np.broadcast_to(as_shaped(velocity, "velocity", robot.n), shape))
-            before = before.reshape(-1, robot.n)
+        rows, _ = _joint_vectors(self.robot, q)
         if self._program is None or self._depends or self._program.data.shape[0] not in (1, rows.shape[0]):
-            self._program = assemble(robot, self._levels, rows)
-        program = self._program
-        out = np.zeros(rows.shape)
-        errors = np.empty((rows.shape[0], program.tasks.weight.size))
-
-        def work(first: int, last: int) -> None:
-            steps(
-                robot.model, program.tasks, program.levels, program.data, program.goal, rows, before, limits.lower,
-                limits.upper, limits.velocity, acceleration, self.dt, self._damping, first, last, out, errors,
-            )  # fmt: skip
-
-        over_ranges(work, rows.shape[0], GRAIN)
-        return out.reshape(shape)
-
-    def _refuse(self, rows: Array) -> None:
-        limits = self.robot.limits
-        over = (rows < limits.lower - 1e-9) | (rows > limits.upper + 1e-9)
-        at, joint = (int(i) for i in np.argwhere(over)[0])
-        raise InputError(
-            f"q of joint {self.robot.joint_names[joint]!r} is {rows[at, joint]:.6g}, outside its limits "
-            f"[{limits.lower[joint]:.6g}, {limits.upper[joint]:.6g}]; clip it with robot.limits.clip(q)"
-        )
-
-
-def _members(level: Task | Sequence[Task]) -> list[Task]:
-    return [level] if isinstance(level, Task) else list(level)
+            self._program = assemble(self.robot, self._levels, rows)
+        return _advance(self.robot, self._levels, self._program, q, velocity, self.dt, self._damping)
 
 
 def step(
     robot: Robot,
     q: ArrayLike,
-    tasks: Sequence[Task | Sequence[Task]],
+    tasks: Levels,
     dt: float,
     *,
     velocity: ArrayLike | None = None,
@@ -176,9 +237,11 @@ def step(
 
     Limits: position always; velocity times *dt*; acceleration, where the robot has it and *velocity* ``(..., n)``, the
     velocity of the previous step, is given. Then every step also leaves room to brake in front of the position
-    limits. Targets of the tasks may be batched like *q*. For many calls with the same tasks use `Stepper`.
+    limits. Targets of the tasks may be batched like *q*. What does not change with the targets is kept between calls.
     """
-    return Stepper(robot, tasks, dt, damping=damping)(q, velocity)
+    dt, square = _settings(dt, damping)
+    program = assemble(robot, tasks, _joint_vectors(robot, q)[0])
+    return _advance(robot, tasks, program, q, velocity, dt, square)
 
 
 class TrackStatus(Status):
@@ -214,7 +277,7 @@ def track(
     q0: ArrayLike,
     dt: float = 0.01,
     *,
-    tasks: Sequence[Task | Sequence[Task]] = (),
+    tasks: Levels = (),
     tolerance: float = 1e-6,
     max_steps: int = 50,
 ) -> TrackResult:

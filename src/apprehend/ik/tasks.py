@@ -6,8 +6,9 @@ row; a weight of zero leaves a row out (a partial pose).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,11 +19,12 @@ from ..kernels import ik_tasks as codes
 from ..kinematics import Robot
 
 Z_AXIS = (0.0, 0.0, 1.0)
+_EMPTY_POSE = np.eye(4).reshape(16)
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """A task in the form of the kernels: one entry of `kernels.ik_tasks.TaskList`, with its targets."""
+    """All of a task but its targets, in the form of the kernels: one entry of `kernels.ik_tasks.TaskList`."""
 
     kind: int
     weight: Array
@@ -31,21 +33,61 @@ class Rows:
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
     axis: tuple[float, float, float] = Z_AXIS
     pick: tuple[int, ...] = ()
-    data: Array = field(default_factory=lambda: np.zeros((1, 16)))  # (N or 1, 16)
-    goal: Array | None = None  # (N or 1, n)
+    blank: Array | None = None  # (16,) what the targets leave as it is
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
     """Base of the tasks."""
 
-    def _rows(self, robot: Robot, q: Array) -> Rows:
-        """The task for *robot* in the form of the kernels; *q* ``(N, n)`` for tasks that depend on it."""
+    slot: ClassVar[slice] = slice(0, 16)
+    """Where the targets stand among the 16 numbers of the kernels."""
+
+    def _key(self) -> Hashable:
+        """All that `_rows` depends on: tasks with equal keys differ in their targets only."""
         raise NotImplementedError
 
+    def _rows(self, robot: Robot) -> Rows:
+        """The task for *robot*, checked."""
+        raise NotImplementedError
 
-def _flat(value: Array, *tail: int) -> Array:
-    return value.reshape(-1, *tail)
+    def _targets(self, robot: Robot, q: Array) -> Array:
+        """Targets ``(N or 1, …)`` as they stand in the slot, or joint values; their shape is checked, not their
+        values."""
+        raise NotImplementedError
+
+    def _check(self, robot: Robot, q: Array) -> None:
+        """Raise for what is wrong with the values of the targets."""
+        self._targets(robot, q)
+
+
+def _shaped(value: Any, name: str, *tail: int) -> Array:
+    """*value* as float64 ``(M, size)`` of shape ``(..., *tail)``; the numbers are not looked at."""
+    if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.shape[-len(tail) :] == tail:
+        array: Array = value
+    else:
+        array = as_shaped(value, name, *tail, finite=False)
+    size = 1
+    for n in tail:
+        size *= n
+    return array.reshape(-1, size)
+
+
+def _pose(value: Any, name: str) -> Array:
+    if not isinstance(value, np.ndarray) and hasattr(value, "matrix"):
+        value = value.matrix
+    return _shaped(value, name, 4, 4)
+
+
+def _hashable(value: Any) -> Hashable:
+    kind = type(value)
+    if kind is float or kind is int or (kind is tuple and all(type(v) is float for v in value)):
+        return value  # type: ignore[no-any-return]
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return id(value)
+    return array.shape, array.tobytes()
 
 
 def _weights(weight: ArrayLike, count: int, gain: float, name: str) -> Array:
@@ -69,15 +111,9 @@ def _unit(value: ArrayLike, name: str) -> Array:
 
 
 def _three(v: Array) -> tuple[float, float, float]:
+    if v.shape != (3,):
+        raise InputError(f"a point or axis of a task has shape {v.shape}; expected (3,), one for all targets")
     return float(v[0]), float(v[1]), float(v[2])
-
-
-def _pose_data(T: Array) -> Array:
-    T = _flat(T, 4, 4)
-    data = np.zeros((T.shape[0], 16))
-    data[:, :9] = T[:, :3, :3].reshape(-1, 9)
-    data[:, 9:12] = T[:, :3, 3]
-    return data
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +125,18 @@ class PoseTask(Task):
     weight: ArrayLike = 1.0
     gain: float = 1.0
 
-    def _rows(self, robot: Robot, q: Array) -> Rows:
-        T = as_pose(self.T, "PoseTask.T")
+    def _key(self) -> Hashable:
+        return PoseTask, self.frame, _hashable(self.weight), self.gain
+
+    def _rows(self, robot: Robot) -> Rows:
         w = _weights(self.weight, 6, self.gain, "PoseTask")
-        return Rows(codes.POSE, w, self.gain, (robot.frame_index(self.frame), -1), data=_pose_data(T))
+        return Rows(codes.POSE, w, self.gain, (robot.frame_index(self.frame), -1))
+
+    def _targets(self, robot: Robot, q: Array) -> Array:
+        return _pose(self.T, "PoseTask.T")
+
+    def _check(self, robot: Robot, q: Array) -> None:
+        as_pose(self.T, "PoseTask.T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,15 +148,21 @@ class PositionTask(Task):
     point: ArrayLike = (0.0, 0.0, 0.0)
     weight: ArrayLike = 1.0
     gain: float = 1.0
+    slot: ClassVar[slice] = slice(3, 12, 4)
 
-    def _rows(self, robot: Robot, q: Array) -> Rows:
-        p = _flat(as_shaped(self.position, "PositionTask.position", 3), 3)
-        data = np.zeros((p.shape[0], 16))
-        data[:, [0, 4, 8]] = 1.0
-        data[:, 9:12] = p
-        point = as_shaped(self.point, "PositionTask.point", 3)
+    def _key(self) -> Hashable:
+        return PositionTask, self.frame, _hashable(self.point), _hashable(self.weight), self.gain
+
+    def _rows(self, robot: Robot) -> Rows:
+        point = _three(as_shaped(self.point, "PositionTask.point", 3))
         w = _weights(self.weight, 3, self.gain, "PositionTask")
-        return Rows(codes.POSITION, w, self.gain, (robot.frame_index(self.frame), -1), _three(point), data=data)
+        return Rows(codes.POSITION, w, self.gain, (robot.frame_index(self.frame), -1), point, blank=_EMPTY_POSE)
+
+    def _targets(self, robot: Robot, q: Array) -> Array:
+        return _shaped(self.position, "PositionTask.position", 3)
+
+    def _check(self, robot: Robot, q: Array) -> None:
+        as_shaped(self.position, "PositionTask.position", 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,14 +174,22 @@ class OrientationTask(Task):
     weight: ArrayLike = 1.0
     gain: float = 1.0
 
-    def _rows(self, robot: Robot, q: Array) -> Rows:
-        R = as_shaped(self.R, "OrientationTask.R", 3, 3)
-        check_rotation(R, "OrientationTask.R")
-        R = _flat(R, 9)
-        data = np.zeros((R.shape[0], 16))
-        data[:, :9] = R
+    def _key(self) -> Hashable:
+        return OrientationTask, self.frame, _hashable(self.weight), self.gain
+
+    def _rows(self, robot: Robot) -> Rows:
         w = _weights(self.weight, 3, self.gain, "OrientationTask")
-        return Rows(codes.ORIENTATION, w, self.gain, (robot.frame_index(self.frame), -1), data=data)
+        return Rows(codes.ORIENTATION, w, self.gain, (robot.frame_index(self.frame), -1))
+
+    def _targets(self, robot: Robot, q: Array) -> Array:
+        R = _shaped(self.R, "OrientationTask.R", 3, 3)
+        T = np.zeros((R.shape[0], 4, 4))
+        T[:, :3, :3] = R.reshape(-1, 3, 3)
+        T[:, 3, 3] = 1.0
+        return T.reshape(-1, 16)
+
+    def _check(self, robot: Robot, q: Array) -> None:
+        check_rotation(as_shaped(self.R, "OrientationTask.R", 3, 3), "OrientationTask.R")
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,14 +201,21 @@ class DirectionTask(Task):
     axis: ArrayLike = Z_AXIS
     weight: ArrayLike = 1.0
     gain: float = 1.0
+    slot: ClassVar[slice] = slice(0, 3)
 
-    def _rows(self, robot: Robot, q: Array) -> Rows:
-        d = _flat(_unit(self.direction, "DirectionTask.direction"), 3)
-        data = np.zeros((d.shape[0], 16))
-        data[:, :3] = d
+    def _key(self) -> Hashable:
+        return DirectionTask, self.frame, _hashable(self.axis), _hashable(self.weight), self.gain
+
+    def _rows(self, robot: Robot) -> Rows:
         axis = _three(_unit(self.axis, "DirectionTask.axis"))
         w = _weights(self.weight, 2, self.gain, "DirectionTask")
-        return Rows(codes.DIRECTION, w, self.gain, (robot.frame_index(self.frame), -1), axis=axis, data=data)
+        return Rows(codes.DIRECTION, w, self.gain, (robot.frame_index(self.frame), -1), axis=axis)
+
+    def _targets(self, robot: Robot, q: Array) -> Array:
+        return _shaped(self.direction, "DirectionTask.direction", 3)
+
+    def _check(self, robot: Robot, q: Array) -> None:
+        _unit(self.direction, "DirectionTask.direction")
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,15 +228,23 @@ class LookAtTask(Task):
     eye: ArrayLike = (0.0, 0.0, 0.0)
     weight: ArrayLike = 1.0
     gain: float = 1.0
+    slot: ClassVar[slice] = slice(0, 3)
 
-    def _rows(self, robot: Robot, q: Array) -> Rows:
-        p = _flat(as_shaped(self.target, "LookAtTask.target", 3), 3)
-        data = np.zeros((p.shape[0], 16))
-        data[:, :3] = p
+    def _key(self) -> Hashable:
+        place = _hashable(self.axis), _hashable(self.eye)
+        return LookAtTask, self.frame, place, _hashable(self.weight), self.gain
+
+    def _rows(self, robot: Robot) -> Rows:
         axis = _three(_unit(self.axis, "LookAtTask.axis"))
         eye = _three(as_shaped(self.eye, "LookAtTask.eye", 3))
         w = _weights(self.weight, 2, self.gain, "LookAtTask")
-        return Rows(codes.LOOK_AT, w, self.gain, (robot.frame_index(self.frame), -1), eye, axis, data=data)
+        return Rows(codes.LOOK_AT, w, self.gain, (robot.frame_index(self.frame), -1), eye, axis)
+
+    def _targets(self, robot: Robot, q: Array) -> Array:
+        return _shaped(self.target, "LookAtTask.target", 3)
+
+    def _check(self, robot: Robot, q: Array) -> None:
+        as_shaped(self.target, "LookAtTask.target", 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,14 +254,21 @@ class ComTask(Task):
     position: ArrayLike
     weight: ArrayLike = 1.0
     gain: float = 1.0
+    slot: ClassVar[slice] = slice(0, 3)
 
-    def _rows(self, robot: Robot, q: Array) -> Rows:
-        p = _flat(as_shaped(self.position, "ComTask.position", 3), 3)
+    def _key(self) -> Hashable:
+        return ComTask, _hashable(self.weight), self.gain
+
+    def _rows(self, robot: Robot) -> Rows:
         if not robot.model.inertia[:, 0].sum() > 0.0:
             raise InputError(f"robot {robot.name!r} has no mass: its centre of mass is undefined")
-        data = np.zeros((p.shape[0], 16))
-        data[:, :3] = p
-        return Rows(codes.COM, _weights(self.weight, 3, self.gain, "ComTask"), self.gain, data=data)
+        return Rows(codes.COM, _weights(self.weight, 3, self.gain, "ComTask"), self.gain)
+
+    def _targets(self, robot: Robot, q: Array) -> Array:
+        return _shaped(self.position, "ComTask.position", 3)
+
+    def _check(self, robot: Robot, q: Array) -> None:
+        as_shaped(self.position, "ComTask.position", 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,11 +281,18 @@ class RelativeTask(Task):
     weight: ArrayLike = 1.0
     gain: float = 1.0
 
-    def _rows(self, robot: Robot, q: Array) -> Rows:
-        T = as_pose(self.T, "RelativeTask.T")
+    def _key(self) -> Hashable:
+        return RelativeTask, self.frame, self.of, _hashable(self.weight), self.gain
+
+    def _rows(self, robot: Robot) -> Rows:
         w = _weights(self.weight, 6, self.gain, "RelativeTask")
-        frames = (robot.frame_index(self.of), robot.frame_index(self.frame))
-        return Rows(codes.RELATIVE, w, self.gain, frames, data=_pose_data(T))
+        return Rows(codes.RELATIVE, w, self.gain, (robot.frame_index(self.of), robot.frame_index(self.frame)))
+
+    def _targets(self, robot: Robot, q: Array) -> Array:
+        return _pose(self.T, "RelativeTask.T")
+
+    def _check(self, robot: Robot, q: Array) -> None:
+        as_pose(self.T, "RelativeTask.T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,28 +303,47 @@ class PostureTask(Task):
     weight: ArrayLike = 1.0
     gain: float = 0.1
 
-    def _rows(self, robot: Robot, q: Array) -> Rows:
-        goal = _flat(as_shaped(self.q, "PostureTask.q", robot.n), robot.n)
+    def _key(self) -> Hashable:
+        return PostureTask, _hashable(self.weight), self.gain
+
+    def _rows(self, robot: Robot) -> Rows:
         w = _weights(self.weight, robot.n, self.gain, "PostureTask")
-        return Rows(codes.JOINTS, w, self.gain, pick=tuple(range(robot.n)), goal=goal)
+        return Rows(codes.JOINTS, w, self.gain, pick=tuple(range(robot.n)))
+
+    def _targets(self, robot: Robot, q: Array) -> Array:
+        return _shaped(self.q, "PostureTask.q", robot.n)
+
+    def _check(self, robot: Robot, q: Array) -> None:
+        as_shaped(self.q, "PostureTask.q", robot.n)
 
 
 @dataclass(frozen=True, eq=False)
 class JointTask(Task):
     """Bring the joints *names* to *values* ``(..., k)``."""
 
-    names: tuple[str, ...]
+    names: Sequence[str]
     values: ArrayLike
     weight: ArrayLike = 1.0
     gain: float = 1.0
 
-    def _rows(self, robot: Robot, q: Array) -> Rows:
+    def _key(self) -> Hashable:
+        return JointTask, tuple(self.names), _hashable(self.weight), self.gain
+
+    def _rows(self, robot: Robot) -> Rows:
+        if isinstance(self.names, str):
+            raise InputError(f"JointTask.names is {self.names!r}; expected a sequence of names, ({self.names!r},)")
         pick = tuple(robot.index(name) for name in self.names)
-        values = _flat(as_shaped(self.values, "JointTask.values", len(pick)), len(pick))
-        goal = np.zeros((values.shape[0], robot.n))
-        goal[:, list(pick)] = values
         w = _weights(self.weight, len(pick), self.gain, "JointTask")
-        return Rows(codes.JOINTS, w, self.gain, pick=pick, goal=goal)
+        return Rows(codes.JOINTS, w, self.gain, pick=pick)
+
+    def _targets(self, robot: Robot, q: Array) -> Array:
+        values = _shaped(self.values, "JointTask.values", len(self.names))
+        goal = np.zeros((values.shape[0], robot.n))
+        goal[:, [robot.index(name) for name in self.names]] = values
+        return goal
+
+    def _check(self, robot: Robot, q: Array) -> None:
+        as_shaped(self.values, "JointTask.values", len(self.names))
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,21 +358,26 @@ class DescentTask(Task):
     rate: float = 0.1
     frame: str | None = None
 
-    def _rows(self, robot: Robot, q: Array) -> Rows:
-        if self.cost == "limits":
-            gradient = _limit_gradient(robot, q)
-        elif self.cost == "manipulability":
+    def _key(self) -> Hashable:
+        return DescentTask, self.cost if isinstance(self.cost, str) else callable(self.cost), self.rate, self.frame
+
+    def _rows(self, robot: Robot) -> Rows:
+        if self.cost == "manipulability":
             if self.frame is None:
                 raise InputError("DescentTask.frame is missing; the manipulability is that of a frame")
-            gradient = _manipulability_gradient(robot, q, self.frame)
-        elif callable(self.cost):
-            gradient = _flat(as_shaped(self.cost(q), "the gradient of DescentTask.cost", robot.n), robot.n)
-        else:
+        elif self.cost != "limits" and not callable(self.cost):
             unknown_name("cost", str(self.cost), ("limits", "manipulability"), "DescentTask (or give a function)")
         if not self.rate > 0.0:
             raise InputError(f"DescentTask.rate is {self.rate}; expected a positive number")
-        goal = -self.rate * gradient
-        return Rows(codes.DESCENT, np.ones(robot.n), 1.0, pick=tuple(range(robot.n)), goal=goal)
+        return Rows(codes.DESCENT, np.ones(robot.n), 1.0, pick=tuple(range(robot.n)))
+
+    def _targets(self, robot: Robot, q: Array) -> Array:
+        if self.cost == "limits":
+            return -self.rate * _limit_gradient(robot, q)
+        if self.cost == "manipulability":
+            return -self.rate * _manipulability_gradient(robot, q, str(self.frame))
+        gradient = as_shaped(self.cost(q), "the gradient of DescentTask.cost", robot.n)
+        return -self.rate * gradient.reshape(-1, robot.n)
 
 
 def _limit_gradient(robot: Robot, q: Array) -> Array:

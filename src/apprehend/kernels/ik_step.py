@@ -13,7 +13,7 @@ from ._jit import kernel
 from .chain import load_block
 from .ik_priority import prioritised, priority_work, step_bounds
 from .ik_saturate import MET, saturate, saturate_work
-from .ik_tasks import task_block
+from .ik_tasks import first_fault, task_block
 from .lanes import LANES
 from .tree import tree_block
 from .vector import larger, load, magnitude, root, select, smaller, some, splat, store
@@ -137,11 +137,35 @@ def steps_block(J, e, levels, damping, low, high, n, dq, N, A, H, rest, z, y, u,
 
 @kernel
 def steps(
-    tree, tasks, levels, data, goal, q, before, lower, upper, speed, acceleration, dt, damping, first, last, out, errors
+    tree,
+    tasks,
+    kept,
+    levels,
+    data,
+    goal,
+    q,
+    before,
+    lower,
+    upper,
+    speed,
+    acceleration,
+    dt,
+    damping,
+    first,
+    last,
+    out,
+    fault,
 ):
-    """Steps ``out (N, n)`` for rows first … last of ``q (N, n)``, and the tasks' weighted errors ``errors (N, R)``."""
+    """Steps ``out (N, n)`` for rows first … last of ``q (N, n)``; *kept* are the rows of the tasks that count.
+
+    ``fault (1)`` becomes what `first_fault` finds, and then no step is made.
+    """
+    wrong = first_fault(tasks, data, goal, q, lower, upper, first, last)
+    if wrong != 0:
+        fault[0] = wrong
+        return
     n = q.shape[1]
-    rows = tasks.row[tasks.row.shape[0] - 1]
+    rows = max(tasks.row[tasks.row.shape[0] - 1], 1)
     buffer, value, poses = np.empty(n * L), np.empty(L), np.empty(12 * max(tree.kind.shape[0], 1) * L)
     J, e = np.zeros(rows * n * L), np.zeros(rows * L)
     low, high, dq = np.empty(n * L), np.empty(n * L), np.empty(n * L)
@@ -150,11 +174,15 @@ def steps(
     bounds = saturate_work(n)
     work = priority_work(n, rows)
     lo, hi = np.empty(n), np.empty(n)
-    J1 = np.empty((rows, n))
+    J1, e1 = np.empty((rows, n)), np.empty(rows)
     for block in range(first, last, L):
         load_block(q, block, last, buffer)
         tree_block(tree, buffer, value, poses)
         task_block(tree, tasks, data, goal, buffer, block, last, poses, J, e)
+        if kept.shape[0] < rows:
+            for r in range(kept.shape[0]):
+                e[r * L : (r + 1) * L] = e[kept[r] * L : (kept[r] + 1) * L]
+                J[r * n * L : (r + 1) * n * L] = J[kept[r] * n * L : (kept[r] + 1) * n * L]
         for l in range(L):
             i = min(block + l, last - 1)
             step_bounds(q[i], lower, upper, speed, acceleration, before[i], dt, lo, hi)
@@ -164,15 +192,15 @@ def steps(
         steps_block(J, e, levels, damping, low, high, n, dq, N, A, H, rest, z, y, u, bounds, irregular)
         for l in range(min(L, last - block)):
             i = block + l
-            for r in range(rows):
-                errors[i, r] = e[r * L + l]
             if irregular[l] == 0.0:
                 for k in range(n):
                     out[i, k] = dq[k * L + l]
                 continue
+            for r in range(kept.shape[0]):
+                e1[r] = e[r * L + l]
+                for k in range(n):
+                    J1[r, k] = J[(r * n + k) * L + l]
             for k in range(n):
                 lo[k] = low[k * L + l]
                 hi[k] = high[k * L + l]
-                for r in range(rows):
-                    J1[r, k] = J[(r * n + k) * L + l]
-            prioritised(J1, errors[i], levels, damping, lo, hi, out[i], work)
+            prioritised(J1, e1, levels, damping, lo, hi, out[i], work)

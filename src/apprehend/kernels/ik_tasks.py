@@ -1,7 +1,7 @@
 """Rows of prioritised tasks: errors and Jacobians on lanes.
 
 A list of tasks reaches the kernels as `TaskList`, and the numbers that may differ from problem to problem as
-``data (N or 1, T, 16)`` (targets) and ``goal (N or 1, T, n)`` (joint values).
+``data (N or 1, T, 16)`` (targets: poses as 4 × 4, or vectors) and ``goal (N or 1, T, n)`` (joint values).
 
 ==============  ===========  ========================================================================================
 field           shape        meaning (T tasks, R rows, n coordinates)
@@ -31,18 +31,22 @@ import numpy as np
 from ._jit import kernel
 from .chain import REVOLUTE
 from .lanes import LANES
+from .vector import larger, load, root, splat, store
 
 L = LANES
 
-POSE = 0  # data: rotation (9), position (3)
-POSITION = 1  # data[9:12]: where `point` shall be; data[:9]: the axes in which the rows are measured
-ORIENTATION = 2  # data[:9]
-DIRECTION = 3  # data[:3]: unit vector of the world along which `axis` shall point
+POSE = 0  # data: pose
+POSITION = 1  # data: pose of axes at the place where `point` shall be, in which the rows are measured
+ORIENTATION = 2  # data: pose, of which the rotation counts
+DIRECTION = 3  # data[:3]: vector of the world along which `axis` shall point
 LOOK_AT = 4  # data[:3]: point of the world that the ray from `point` along `axis` shall meet
 COM = 5  # data[:3]
 RELATIVE = 6  # data: pose of frame 1 in frame 0
 JOINTS = 7  # goal: values
 DESCENT = 8  # goal: the step itself
+
+ROTATION_TOLERANCE = 1e-6  # as in `arrays`
+OUTSIDE = 1e-9  # a joint may be this far outside its limits
 
 
 class TaskList(NamedTuple):
@@ -65,18 +69,15 @@ def frame_block(tree, poses, frame, X):
     place = tree.frame_place[frame]
     if joint < 0:
         for i in range(12):
-            for l in range(L):
-                X[i * L + l] = place[i]
+            store(X, i * L, splat(place[i]))
         return
-    P = poses[12 * joint * L : 12 * (joint + 1) * L]
-    for l in range(L):
-        for r in range(3):
-            a0 = P[3 * r * L + l]
-            a1 = P[(3 * r + 1) * L + l]
-            a2 = P[(3 * r + 2) * L + l]
-            for c in range(3):
-                X[(3 * r + c) * L + l] = a0 * place[c] + a1 * place[3 + c] + a2 * place[6 + c]
-            X[(9 + r) * L + l] = P[(9 + r) * L + l] + a0 * place[9] + a1 * place[10] + a2 * place[11]
+    o = 12 * joint * L
+    for r in range(3):
+        a0, a1, a2 = load(poses, o + 3 * r * L), load(poses, o + (3 * r + 1) * L), load(poses, o + (3 * r + 2) * L)
+        for c in range(3):
+            store(X, (3 * r + c) * L, a0 * place[c] + a1 * place[3 + c] + a2 * place[6 + c])
+        p = load(poses, o + (9 + r) * L)
+        store(X, (9 + r) * L, p + a0 * place[9] + a1 * place[10] + a2 * place[11])
 
 
 @kernel
@@ -84,35 +85,24 @@ def moving_block(tree, poses, frame, point, G, n, sign):
     """Add *sign* times the velocity of ``point (3 * L)`` of the world fixed to *frame*, and its angular velocity, to
     ``G (6, n, L)``."""
     joint = tree.frame_joint[frame]
+    px, py, pz = load(point, 0), load(point, L), load(point, 2 * L)
     while joint >= 0:
-        P = poses[12 * joint * L : 12 * (joint + 1) * L]
-        c = tree.coordinate[joint]
+        o = 12 * joint * L
+        c = tree.coordinate[joint] * L
         g = sign * tree.gain[joint, 0]
-        gx = G[c * L : (c + 1) * L]
-        gy = G[(n + c) * L : (n + c + 1) * L]
-        gz = G[(2 * n + c) * L : (2 * n + c + 1) * L]
+        ax, ay, az = g * load(poses, o + 2 * L), g * load(poses, o + 5 * L), g * load(poses, o + 8 * L)
+        vx, vy, vz = ax, ay, az
         if tree.kind[joint] == REVOLUTE:
-            hx = G[(3 * n + c) * L : (3 * n + c + 1) * L]
-            hy = G[(4 * n + c) * L : (4 * n + c + 1) * L]
-            hz = G[(5 * n + c) * L : (5 * n + c + 1) * L]
-            for l in range(L):
-                ax = g * P[2 * L + l]
-                ay = g * P[5 * L + l]
-                az = g * P[8 * L + l]
-                dx = point[l] - P[9 * L + l]
-                dy = point[L + l] - P[10 * L + l]
-                dz = point[2 * L + l] - P[11 * L + l]
-                gx[l] += ay * dz - az * dy
-                gy[l] += az * dx - ax * dz
-                gz[l] += ax * dy - ay * dx
-                hx[l] += ax
-                hy[l] += ay
-                hz[l] += az
-        else:
-            for l in range(L):
-                gx[l] += g * P[2 * L + l]
-                gy[l] += g * P[5 * L + l]
-                gz[l] += g * P[8 * L + l]
+            dx = px - load(poses, o + 9 * L)
+            dy = py - load(poses, o + 10 * L)
+            dz = pz - load(poses, o + 11 * L)
+            vx, vy, vz = ay * dz - az * dy, az * dx - ax * dz, ax * dy - ay * dx
+            store(G, 3 * n * L + c, load(G, 3 * n * L + c) + ax)
+            store(G, 4 * n * L + c, load(G, 4 * n * L + c) + ay)
+            store(G, 5 * n * L + c, load(G, 5 * n * L + c) + az)
+        store(G, c, load(G, c) + vx)
+        store(G, n * L + c, load(G, n * L + c) + vy)
+        store(G, 2 * n * L + c, load(G, 2 * n * L + c) + vz)
         joint = tree.parent[joint]
 
 
@@ -158,15 +148,13 @@ def rotation_vectors(A, B, out):
 def turned_block(R, G, first, v, J, e, r, n):
     """Rows r … r + 2 of J and e: ``Rᵀ`` times rows first … of G and the vector ``v (3 * L)``."""
     for k in range(3):
-        for l in range(L):
-            e[(r + k) * L + l] = R[k * L + l] * v[l] + R[(3 + k) * L + l] * v[L + l] + R[(6 + k) * L + l] * v[2 * L + l]
+        x, y, z = load(R, k * L), load(R, (3 + k) * L), load(R, (6 + k) * L)
+        store(e, (r + k) * L, x * load(v, 0) + y * load(v, L) + z * load(v, 2 * L))
         for c in range(n):
-            out = J[((r + k) * n + c) * L : ((r + k) * n + c + 1) * L]
-            a = G[(first * n + c) * L : (first * n + c + 1) * L]
-            b = G[((first + 1) * n + c) * L : ((first + 1) * n + c + 1) * L]
-            d = G[((first + 2) * n + c) * L : ((first + 2) * n + c + 1) * L]
-            for l in range(L):
-                out[l] = R[k * L + l] * a[l] + R[(3 + k) * L + l] * b[l] + R[(6 + k) * L + l] * d[l]
+            a = load(G, (first * n + c) * L)
+            b = load(G, ((first + 1) * n + c) * L)
+            d = load(G, ((first + 2) * n + c) * L)
+            store(J, ((r + k) * n + c) * L, x * a + y * b + z * d)
 
 
 @kernel
@@ -200,13 +188,20 @@ def tangents(a, d, U, e, r):
 def tangent_rows(U, G, J, r, n):
     """Rows r, r + 1 of J: the angular velocities in rows 3 … 5 of G along the tangents."""
     for h in range(2):
+        x, y, z = load(U, 3 * h * L), load(U, (3 * h + 1) * L), load(U, (3 * h + 2) * L)
         for c in range(n):
-            out = J[((r + h) * n + c) * L : ((r + h) * n + c + 1) * L]
-            x = G[(3 * n + c) * L : (3 * n + c + 1) * L]
-            y = G[(4 * n + c) * L : (4 * n + c + 1) * L]
-            z = G[(5 * n + c) * L : (5 * n + c + 1) * L]
-            for l in range(L):
-                out[l] = U[3 * h * L + l] * x[l] + U[(3 * h + 1) * L + l] * y[l] + U[(3 * h + 2) * L + l] * z[l]
+            a, b, d = load(G, (3 * n + c) * L), load(G, (4 * n + c) * L), load(G, (5 * n + c) * L)
+            store(J, ((r + h) * n + c) * L, x * a + y * b + z * d)
+
+
+@kernel
+def unit_block(v):
+    """Scale ``v (3 * L)`` to length one."""
+    x, y, z = load(v, 0), load(v, L), load(v, 2 * L)
+    f = 1.0 / larger(root(x * x + y * y + z * z), 1e-300)
+    store(v, 0, x * f)
+    store(v, L, y * f)
+    store(v, 2 * L, z * f)
 
 
 @kernel
@@ -215,18 +210,17 @@ def sight_block(D, point, d, G, n):
 
     The line itself turns with −d × v / length, where v is the velocity of *point*, rows 0 … 2 of G.
     """
-    inverse = np.empty(L)
-    for l in range(L):
-        x, y, z = D[l] - point[l], D[L + l] - point[L + l], D[2 * L + l] - point[2 * L + l]
-        f = 1.0 / max(math.sqrt(x * x + y * y + z * z), 1e-9)
-        inverse[l] = f
-        d[l], d[L + l], d[2 * L + l] = x * f, y * f, z * f
+    x, y, z = load(D, 0) - load(point, 0), load(D, L) - load(point, L), load(D, 2 * L) - load(point, 2 * L)
+    f = 1.0 / larger(root(x * x + y * y + z * z), 1e-9)
+    x, y, z = x * f, y * f, z * f
+    store(d, 0, x)
+    store(d, L, y)
+    store(d, 2 * L, z)
     for c in range(n):
-        for l in range(L):
-            x, y, z = G[c * L + l], G[(n + c) * L + l], G[(2 * n + c) * L + l]
-            G[(3 * n + c) * L + l] += inverse[l] * (d[L + l] * z - d[2 * L + l] * y)
-            G[(4 * n + c) * L + l] += inverse[l] * (d[2 * L + l] * x - d[l] * z)
-            G[(5 * n + c) * L + l] += inverse[l] * (d[l] * y - d[L + l] * x)
+        a, b, w = load(G, c * L), load(G, (n + c) * L), load(G, (2 * n + c) * L)
+        store(G, (3 * n + c) * L, load(G, (3 * n + c) * L) + f * (y * w - z * b))
+        store(G, (4 * n + c) * L, load(G, (4 * n + c) * L) + f * (z * a - x * w))
+        store(G, (5 * n + c) * L, load(G, (5 * n + c) * L) + f * (x * b - y * a))
 
 
 @kernel
@@ -283,20 +277,20 @@ def frame_rows(tree, tasks, t, D, poses, n, X, G, v, a, U, J, e):
     x0, x1, x2 = tasks.axis[t, 0], tasks.axis[t, 1], tasks.axis[t, 2]
     point = U  # free until the tangents are needed
     for k in range(3):
-        for l in range(L):
-            c0, c1, c2 = X[3 * k * L + l], X[(3 * k + 1) * L + l], X[(3 * k + 2) * L + l]
-            point[k * L + l] = X[(9 + k) * L + l] + c0 * p0 + c1 * p1 + c2 * p2
-            a[k * L + l] = c0 * x0 + c1 * x1 + c2 * x2
+        c0, c1, c2 = load(X, 3 * k * L), load(X, (3 * k + 1) * L), load(X, (3 * k + 2) * L)
+        store(point, k * L, load(X, (9 + k) * L) + c0 * p0 + c1 * p1 + c2 * p2)
+        store(a, k * L, c0 * x0 + c1 * x1 + c2 * x2)
     G[:] = 0.0
     moving_block(tree, poses, tasks.frame[t, 0], point, G, n, 1.0)
     if kind in (POSE, POSITION):
-        for k in range(3 * L):
-            v[k] = D[9 * L + k] - point[k]
+        for k in range(3):
+            store(v, k * L, load(D, (9 + k) * L) - load(point, k * L))
         turned_block(D, G, 0, v, J, e, r, n)
     if kind in (POSE, ORIENTATION):
         rotation_vectors(D, X, v)
         turned_block(D, G, 3, v, J, e, r + 3 if kind == POSE else r, n)
     elif kind == DIRECTION:
+        unit_block(D)
         tangents(a, D, U, e, r)
         tangent_rows(U, G, J, r, n)
     elif kind == LOOK_AT:
@@ -330,11 +324,19 @@ def relative_rows(tree, tasks, t, D, poses, n, X, Y, G, v, J, e):
 
 @kernel
 def load_data(data, t, first, last, D):
-    """Targets of task t for the problems from *first* on into ``D (12 * L)``."""
+    """Targets of task t for the problems from *first* on into ``D (12 * L)``: rotation or vector (9), position (3)."""
+    if data.shape[0] == 1:
+        for r in range(3):
+            store(D, (9 + r) * L, splat(data[0, t, 4 * r + 3]))
+            for c in range(3):
+                store(D, (3 * r + c) * L, splat(data[0, t, 4 * r + c]))
+        return
     for l in range(L):
-        row = min(first + l, last - 1) if data.shape[0] > 1 else 0
-        for i in range(12):
-            D[i * L + l] = data[row, t, i]
+        row = min(first + l, last - 1)
+        for r in range(3):
+            D[(9 + r) * L + l] = data[row, t, 4 * r + 3]
+            for c in range(3):
+                D[(3 * r + c) * L + l] = data[row, t, 4 * r + c]
 
 
 @kernel
@@ -367,8 +369,55 @@ def task_block(tree, tasks, data, goal, q, first, last, poses, J, e):
                     e[i * L + l] = goal[row, t, c] - q[c * L + l] if kind == JOINTS else goal[row, t, c]
         for i in range(tasks.row[t], tasks.row[t + 1]):
             w = tasks.weight[i]
-            for l in range(L):
-                e[i * L + l] *= w * tasks.gain[t]
+            store(e, i * L, load(e, i * L) * (w * tasks.gain[t]))
             if w != 1.0:
-                for k in range(i * n * L, (i + 1) * n * L):
-                    J[k] *= w
+                for k in range(i * n, (i + 1) * n):
+                    store(J, k * L, load(J, k * L) * w)
+
+
+@kernel(fast=False)  # a sum minus itself must stay what it is where it is not finite
+def bad_target(kind, pick, data, goal):
+    """Whether a target ``data (16)``, ``goal (n)`` is no finite pose, direction, or point."""
+    total = 0.0
+    if kind >= JOINTS:
+        for c in pick:
+            total += goal[c]
+        return not math.isfinite(total)
+    for i in range(16):
+        total += data[i]
+    if not math.isfinite(total):
+        return True
+    if kind == DIRECTION:
+        return data[0] * data[0] + data[1] * data[1] + data[2] * data[2] < 1e-24
+    if kind in (LOOK_AT, COM):
+        return False
+    if data[12] != 0.0 or data[13] != 0.0 or data[14] != 0.0 or data[15] != 1.0:
+        return True
+    for a in range(3):
+        for b in range(a + 1):
+            dot = data[a] * data[b] + data[4 + a] * data[4 + b] + data[8 + a] * data[8 + b]
+            if abs(dot - (1.0 if a == b else 0.0)) > ROTATION_TOLERANCE:
+                return True
+    x = data[5] * data[10] - data[6] * data[9]
+    y = data[6] * data[8] - data[4] * data[10]
+    z = data[4] * data[9] - data[5] * data[8]
+    return data[0] * x + data[1] * y + data[2] * z < 0.0
+
+
+@kernel(fast=False)
+def first_fault(tasks, data, goal, q, lower, upper, first, last):
+    """What is wrong in the rows first … last: 0 nothing, −1 a joint value that is not finite or outside its limits,
+    t + 1 the target of task t."""
+    for i in range(first, last):
+        for k in range(q.shape[1]):
+            v = q[i, k]
+            if not (v >= lower[k] - OUTSIDE and v <= upper[k] + OUTSIDE and math.isfinite(v)):
+                return -1
+    for t in range(tasks.kind.shape[0]):
+        pick = tasks.pick[tasks.row[t] : tasks.row[t + 1]]
+        for i in range(first, last):
+            if i > 0 and data.shape[0] == 1:
+                break
+            if bad_target(tasks.kind[t], pick, data[i, t], goal[i, t]):
+                return t + 1
+    return 0

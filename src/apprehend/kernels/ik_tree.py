@@ -85,7 +85,7 @@ def solve_tree(
     following, working = first, 0
     for l in range(L):
         for t in range(mine.shape[1]):
-            mine[l, t, 0], mine[l, t, 4], mine[l, t, 8] = 1.0, 1.0, 1.0
+            mine[l, t, 0], mine[l, t, 5], mine[l, t, 10] = 1.0, 1.0, 1.0
         number[l] = -1
     fresh = True
     while working > 0 or fresh:
