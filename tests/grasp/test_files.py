@@ -8,7 +8,7 @@ import pytest
 
 from apprehend.cli import main
 from apprehend.errors import InputError
-from apprehend.grasp import read_grasp, save_picture
+from apprehend.grasp import Contact, Grasp, read_grasp, save_picture
 
 PAIR = {
     "contacts": [
@@ -75,6 +75,11 @@ def test_picture(tmp_path):
     assert path.read_bytes()[:4] == b"\x89PNG"
     with pytest.raises(InputError, match="not a picture's name"):
         save_picture(grasp, tmp_path / "grasp.txt")
+    with pytest.raises(InputError, match="forces has shape"):
+        save_picture(grasp, tmp_path / "grasp.png", forces[:3])
+    flat = Grasp([Contact(np.array([x, 0.0]), np.array([-x, 0.0]), 0.5) for x in (1.0, -1.0)])
+    path = save_picture(flat, tmp_path / "flat.svg", flat.contact_forces([0, -1.0, 0]).forces)
+    assert b"wrench space" in path.read_bytes() or path.stat().st_size > 10_000
 
 
 @pytest.fixture
@@ -111,3 +116,35 @@ def test_commands(tmp_path, apprehend):
     assert "--wrench 'up' is not a list" in error
     frictionless = written(tmp_path, {"contacts": [{**c, "friction": 0} for c in PAIR["contacts"]]}, "smooth.json")
     assert apprehend("grasp", "check", frictionless)[0] == 1
+
+
+def test_commands_on_a_simulated_model(tmp_path, apprehend):
+    from tests.sim.test_grasps import VICE
+
+    path = written(tmp_path, VICE.format(dim=4), "vice.xml")
+    code, out, error = apprehend("grasp", "check", path, "--body", "thing", "--json")
+    assert code == 0, error
+    answer = json.loads(out)
+    assert answer["contacts"] == 2
+    assert answer["quality"]["contacts may be off by (m)"]["upper"] is None
+    assert "antipodal" in apprehend("grasp", "check", path, "--body", "thing")[1]
+    code, out, _ = apprehend("forces", path, "--body", "thing", "--wrench", "0,0,-3,0,0,0", "--json")
+    assert code == 0
+    assert json.loads(out)["value"] > 0.0
+    one = apprehend("grasp", "check", path, "--body", "thing", "--by", "left")
+    assert one[0] == 1
+    assert "wrench not resisted" in one[1]
+    for arguments, message in (
+        ((), "say which is held with --body"),
+        (("--body", "thong"), "Did you mean 'thing'"),
+        (("--body", "thing", "--time", "0"), "nothing touches 'thing'"),
+    ):
+        code, _, error = apprehend("grasp", "check", path, *arguments)
+        assert code == 2
+        assert message in error
+    code, _, error = apprehend("forces", path, "--body", "thing", "--wrench", "1,2")
+    assert code == 2
+    assert "--wrench has 2 numbers; expected 6" in error
+    code, _, error = apprehend("grasp", "check", written(tmp_path, PAIR), "--body", "thing")
+    assert code == 2
+    assert "is no .xml" in error

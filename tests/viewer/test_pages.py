@@ -104,6 +104,28 @@ def test_grasps_of_a_cube(ports: int) -> None:
         assert np.allclose(root, expected, atol=1e-6)
 
 
+def test_contacts_with_their_wrench_space(ports: int) -> None:
+    from scipy.spatial import ConvexHull
+
+    from apprehend import grasp
+    from apprehend.viewer import show_contacts
+    from apprehend.viewer.contacts import wrench_space
+
+    cube = Body.household("cube")
+    made = grasp.Grasp.on_surface(cube, cube.com + 0.1 * np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]]), model="soft")
+    push = made.contact_forces([0, 0, -1.0, 0, 0, 0])
+    with show_contacts(made, push.forces, port=ports, **QUIET) as page:
+        assert {"/contacts/cone2", "/wrenches/force", "/wrenches/torque_ball"} <= set(page.handles)
+    (vertices, faces), (sphere, _) = wrench_space(made, "force", np.zeros(3))
+    corners = vertices[faces]
+    volume = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
+    assert volume == pytest.approx(ConvexHull(vertices).volume, rel=1e-6)  # closed, faces outward
+    hull = ConvexHull(vertices)
+    assert (hull.equations[:, :3] @ sphere.T + hull.equations[:, 3:]).max() < 0.03 * made.length
+    with pytest.raises(InputError, match="forces has shape"):
+        show_contacts(made, [1.0], port=ports, **QUIET)
+
+
 def test_an_episode_without_a_robot(episode: dict[str, Any], ports: int) -> None:
     data, _ = read(episode)
     with Page("x", port=ports) as page, pytest.raises(InputError, match="names no robot"):

@@ -1,15 +1,26 @@
-"""``apprehend grasp check`` and ``apprehend forces``: contacts from a file, closure, quality, forces."""
+"""``apprehend grasp check`` and ``apprehend forces``: contacts from a file or a simulation, judged and loaded."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .console import console, print_json
 
-File = Annotated[Path, typer.Argument(help="contacts: .json or .csv (see apprehend.grasp.read_grasp)")]
+if TYPE_CHECKING:
+    from ..arrays import Array
+    from ..grasp import Grasp
+
+File = Annotated[
+    Path, typer.Argument(help="contacts: .json or .csv (see apprehend.grasp.read_grasp), or an MJCF model .xml")
+]
+BodyName = Annotated[str | None, typer.Option(help="of a model: the body that is held")]
+Time = Annotated[float, typer.Option(help="of a model: seconds to simulate from its first keyframe")]
+By = Annotated[str | None, typer.Option(help="of a model: bodies whose contacts count, with commas (default: all)")]
+View = Annotated[bool, typer.Option("--view", help="show contacts and wrench space in the browser")]
+Port = Annotated[int, typer.Option(help="port of the page")]
 Friction = Annotated[float, typer.Option(help="µ of contacts without their own")]
 Model = Annotated[str, typer.Option(help="frictionless, coulomb, soft or soft_box, for contacts without their own")]
 Torsion = Annotated[float, typer.Option(help="γ in m of soft fingers without their own")]
@@ -24,53 +35,107 @@ def root() -> None:
     """Judge grasps given as contacts."""
 
 
+def _read(
+    file: Path, friction: float, model: str, torsion: float, body: str | None, time: float, by: str | None
+) -> tuple[Grasp, Array | None]:
+    """The grasp, and the forces of the simulation if it comes from one."""
+    from ..errors import InputError
+    from ..grasp import read_grasp
+
+    if file.suffix.lower() != ".xml":
+        if body is not None or by is not None:
+            raise InputError(f"--body and --by pick contacts of a simulated model; {file.name} is no .xml")
+        return read_grasp(file, friction=friction, model=model, torsion=torsion), None
+    if body is None:
+        raise InputError(f"{file.name} is a model with several bodies; say which is held with --body NAME")
+    from ..sim import simulated
+
+    found = simulated(file, body, time, None if by is None else [name.strip() for name in by.split(",")])
+    return found.grasp, found.forces
+
+
+def _qualities(grasp: Grasp) -> dict[str, Any]:
+    found = {
+        "ε, L1, exact cones": grasp.quality(),
+        "ε, L∞, exact cones": grasp.quality(norm="linf"),
+        "ε, L1, 8 edges": grasp.quality(cone="polyhedral"),
+        "ε of forces alone": grasp.quality(subspace="force"),
+        "ε of torques alone": grasp.quality(subspace="torque"),
+        "volume, L1, 8 edges": grasp.quality("volume"),
+        "mean facet distance": grasp.quality("mean_facet_distance"),
+        "smallest singular value": grasp.quality("min_singular_value"),
+        "isotropy": grasp.quality("isotropy"),
+        "contacts may be off by (m)": grasp.quality("position_margin"),
+    }
+    if len(grasp) > 2:
+        found["polygon of contacts (m²)"] = grasp.quality("polygon_area")
+    return found
+
+
 @app.command("check")
 def check(
     file: File,
     friction: Friction = 0.6,
     model: Model = "coulomb",
     torsion: Torsion = 0.0,
+    body: BodyName = None,
+    time: Time = 0.5,
+    by: By = None,
     picture: Picture = None,
+    view: View = False,
+    port: Port = 8080,
     as_json: Json = False,
 ) -> int:
     """Closure with its proof, and the standard qualities. Exit code 0: force closure; 1: none; 2: wrong input."""
-    from ..grasp import read_grasp, save_picture
+    from ..grasp import save_picture
 
-    grasp = read_grasp(file, friction=friction, model=model, torsion=torsion)
+    grasp, forces = _read(file, friction, model, torsion, body, time, by)
     force, form = grasp.force_closure(), grasp.form_closure()
-    qualities = {
-        "ε, L1, exact cones": grasp.quality(),
-        "ε, L∞, exact cones": grasp.quality(norm="linf"),
-        "ε, L1, 8 edges": grasp.quality(cone="polyhedral"),
-        "volume, L1, 8 edges": grasp.quality("volume"),
-        "smallest singular value": grasp.quality("min_singular_value"),
-        "isotropy": grasp.quality("isotropy"),
-    }
+    qualities = _qualities(grasp)
     if picture is not None:
-        save_picture(grasp, picture)
+        save_picture(grasp, picture, forces)
     if as_json:
         print_json(
             {
                 "contacts": len(grasp), "rank": grasp.rank,
                 "force_closure": {"closed": force.success, "margin": force.margin, "why": force.explain(),
+                                  "tolerance": force.tolerance,
                                   "internal_force": force.internal_force.tolist(), "wrench": force.wrench.tolist()},
                 "form_closure": {"closed": form.success, "margin": form.margin, "why": form.explain()},
                 "removable": list(grasp.removable()),
-                "quality": {name: {"lower": q.lower, "upper": q.upper, "worst_wrench": q.worst_wrench.tolist()}
+                "quality": {name: {"lower": q.lower, "upper": q.upper if q.upper < float("inf") else None,
+                                   "worst_wrench": q.worst_wrench.tolist()}
                             for name, q in qualities.items()},
             }
         )  # fmt: skip
-        return 0 if force.success else 1
-    table = _table(f"{file.name}: {len(grasp)} contacts", "property", "value", "certified")
+    else:
+        _print_check(file.name, grasp, force, form, qualities)
+    _show(grasp, forces, view, port)
+    return 0 if force.success else 1
+
+
+def _print_check(title: str, grasp: Grasp, force: Any, form: Any, qualities: dict[str, Any]) -> None:
+    table = _table(f"{title}: {len(grasp)} contacts", "property", "value", "certified")
     table.add_row("force closure", "yes" if force.success else "no", force.explain())
+    if not force.success:
+        table.add_row("wrench not resisted", "", ", ".join(f"{v:.3g}" for v in force.wrench))
     table.add_row("form closure", "yes" if form.success else "no", form.explain())
+    table.add_row("internal forces", f"{grasp.null_space.shape[1]}", "dimension of the null space of G")
+    if len(grasp) == 2:
+        table.add_row("antipodal", "yes" if grasp.antipodal() else "no", "each contact lies in the other's cone")
     removable = ", ".join(map(str, grasp.removable())) or "none"
     table.add_row("contacts that may go", removable, "one at a time, force closure kept")
     for name, q in qualities.items():
         certified = "exact" if q.lower == q.upper else f"between {q.lower:.6g} and {q.upper:.6g}"
-        table.add_row(name, f"{q.value:.6g}", certified)
+        table.add_row(name, f"{q.value:.6g}", certified if q.upper < float("inf") else "at least")
     console.print(table)
-    return 0 if force.success else 1
+
+
+def _show(grasp: Grasp, forces: Array | None, view: bool, port: int) -> None:
+    if view:
+        from .. import viewer
+
+        viewer.show_contacts(grasp, forces, port=port, announce=console.print)
 
 
 def forces(
@@ -84,45 +149,51 @@ def forces(
     friction: Friction = 0.6,
     model: Model = "coulomb",
     torsion: Torsion = 0.0,
+    body: BodyName = None,
+    time: Time = 0.5,
+    by: By = None,
     picture: Picture = None,
+    view: View = False,
+    port: Port = 8080,
     as_json: Json = False,
 ) -> int:
     """Optimal contact forces against a wrench. Exit code 0: found; 1: none exist, with a proof; 2: wrong input."""
     import numpy as np
 
     from ..errors import InputError
-    from ..grasp import ContactForces, Limits, read_grasp, save_picture
+    from ..grasp import ContactForces, Limits, save_picture
 
     try:
         w = np.array([float(v) for v in wrench.split(",")])
     except ValueError as error:
         raise InputError(f"--wrench {wrench!r} is not a list of numbers such as 0,0,-9.81,0,0,0") from error
-    grasp = read_grasp(file, friction=friction, model=model, torsion=torsion)
+    grasp, _ = _read(file, friction, model, torsion, body, time, by)
+    if w.shape != (grasp.wrench_size,):
+        raise InputError(f"--wrench has {w.size} numbers; expected {grasp.wrench_size} for this grasp")
     found = grasp.contact_forces(w, objective, Limits(normal=normal, total=total))
     assert isinstance(found, ContactForces)
     if picture is not None:
         save_picture(grasp, picture, found.forces)
-    finite = found.success
     if as_json:
         print_json(
             {
                 "status": str(found.status), "why": found.explain(), "forces": found.forces.tolist(),
-                "value": found.value if finite else None, "bound": found.bound if finite else None,
+                "value": found.value if found.success else None, "bound": found.bound if found.success else None,
                 "slack": found.slack.tolist(), "active": list(found.active),
                 "certificate": found.certificate.tolist(),
             }
         )  # fmt: skip
-        return 0 if found.success else 1
-    if not found.success:
+    elif not found.success:
         console.print(found.explain())
         console.print("proof (direction in scaled wrench space): " + ", ".join(f"{v:.6g}" for v in found.certificate))
-        return 1
-    table = _table(f"{objective} = {found.value:.9g}, at least {found.bound:.9g}", "contact", "force", "inside by")
-    for i, s in enumerate(grasp.slices):
-        table.add_row(str(i), ", ".join(f"{v:.5g}" for v in found.forces[s]), f"{found.slack[i]:.3g} N")
-    console.print(table)
-    console.print("limits reached: " + (", ".join(found.active) or "none"))
-    return 0
+    else:
+        table = _table(f"{objective} = {found.value:.9g}, at least {found.bound:.9g}", "contact", "force", "inside by")
+        for i, s in enumerate(grasp.slices):
+            table.add_row(str(i), ", ".join(f"{v:.5g}" for v in found.forces[s]), f"{found.slack[i]:.3g} N")
+        console.print(table)
+        console.print("limits reached: " + (", ".join(found.active) or "none"))
+    _show(grasp, found.forces, view, port)
+    return 0 if found.success else 1
 
 
 def _table(title: str, *columns: str) -> Any:

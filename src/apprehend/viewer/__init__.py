@@ -1,5 +1,6 @@
 """The viewer: pictures without a graphics card, the report of an episode, and live pages in the browser."""
 
+from .contacts import show_contacts
 from .draw import render
 from .live import Page
 from .pages import show_body, show_grasp, show_robot
@@ -19,6 +20,7 @@ __all__ = [
     "render",
     "show",
     "show_body",
+    "show_contacts",
     "show_grasp",
     "show_robot",
     "write_report",
