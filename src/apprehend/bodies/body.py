@@ -6,19 +6,18 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, as_shaped
 from ..errors import InputError, MeshError
-from ..files import replace_file
 from . import rest
 from .convex import ConvexParts, Piece, decompose
 from .load import check_mesh, read_mesh
 from .mass import Solid, check_inertia, solid
-from .queries import Queries
+from .models import Models
 from .repair import Mended, mend, union
 from .rest import RestPose
 
@@ -32,7 +31,7 @@ side has facets. At 0.3 kg it is an energy of 1 mJ."""
 
 
 @dataclass(frozen=True, eq=False)
-class Body(Queries):
+class Body(Models):
     """A rigid body. Everything is in the coordinates of its mesh file, in SI units; make one with `Body.load`.
 
     The centre of mass and the inertia are those of the solid of even density that the surface encloses, unless given.
@@ -291,19 +290,9 @@ class Body(Queries):
 
     def save(self, path: str | Path) -> Path:
         """Write the mesh in metres (``.obj``, ``.stl``, ``.ply`` or ``.glb``), under a temporary name first."""
-        import trimesh
+        from . import files
 
-        from .load import FORMATS
-
-        path = Path(path)
-        if path.suffix.lower() not in FORMATS:
-            raise MeshError(f"{path}: the ending {path.suffix!r} is not a mesh format; expected {', '.join(FORMATS)}")
-        mesh = trimesh.Trimesh(self.vertices, self.faces, process=False)
-        options: dict[str, Any] = {"digits": 9} if path.suffix.lower() == ".obj" else {}
-        data: Any = mesh.export(file_type=path.suffix.lower()[1:], **options)
-        with replace_file(path) as work:
-            work.write_bytes(data.encode() if isinstance(data, str) else data)
-        return path
+        return files.write_mesh(path, self.vertices, self.faces)
 
 
 def _is_number(value: object) -> bool:

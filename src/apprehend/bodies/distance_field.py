@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,10 @@ from ..kernels.distance_field import Field
 from ..parallel import over_ranges
 from . import files
 from .index import MeshIndex
+
+if TYPE_CHECKING:
+    from .surface_mesh import SurfaceMesh
+    from .voxels import Voxels
 
 MOST_POINTS = 2**28
 """Most grid points of a field: 1 GiB of float32."""
@@ -145,6 +149,21 @@ class DistanceField:
         """Whether `distance` is negative."""
         within: BoolArray = self.distance(points) < 0.0
         return within
+
+    def surface(self, level: float = 0.0) -> SurfaceMesh:
+        """The surface at distance *level* m: every point of it is within `error` of that distance.
+
+        With *level* = `error` it contains the body. Walls thinner than the spacing may get lost at a level of 0.
+        """
+        from .surface_mesh import level_set
+
+        return level_set(self.values, self.origin, self.spacing, level)
+
+    def voxels(self, rule: str = "enclosing") -> Voxels:
+        """Cubes around the grid points: those that may touch the body, or (``"centres"``) whose centre is inside."""
+        from .voxels import Voxels
+
+        return Voxels.of(self, rule)
 
     def save(self, path: str | Path) -> Path:
         """Write the field as ``.npz``; `load` reads it."""

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..arrays import Array, IntArray
+from ..errors import InputError, MeshError
 from ..files import replace_file
 
 
@@ -37,3 +38,20 @@ def read(path: str | Path, kind: str) -> dict[str, Any]:
             f"{target} holds {str(found['kind']) if 'kind' in found else 'no model'!r}; expected a {kind!r}"
         )
     return {k: v[()] if v.ndim == 0 else v for k, v in found.items()}
+
+
+def write_mesh(path: str | Path, vertices: Array, faces: IntArray) -> Path:
+    """Write a mesh in metres (``.obj``, ``.stl``, ``.ply`` or ``.glb``), under a temporary name first."""
+    import trimesh
+
+    from .load import FORMATS
+
+    path = Path(path)
+    if path.suffix.lower() not in FORMATS:
+        raise MeshError(f"{path}: the ending {path.suffix!r} is not a mesh format; expected {', '.join(FORMATS)}")
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    options: dict[str, Any] = {"digits": 9} if path.suffix.lower() == ".obj" else {}
+    data: Any = mesh.export(file_type=path.suffix.lower()[1:], **options)
+    with replace_file(path) as work:
+        work.write_bytes(data.encode() if isinstance(data, str) else data)
+    return path

@@ -7,6 +7,7 @@ that neighbours run alike, cap holes, turn parts that face inwards, unite parts 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -243,18 +244,27 @@ def union(
     """The union of closed *parts* less the *cavities* (wound inwards), or None where one is not a 2-manifold."""
     import manifold3d
 
-    def volume_of(part: tuple[Array, IntArray], turn: bool = False) -> manifold3d.Manifold:
-        faces = part[1][:, ::-1] if turn else part[1]
-        mesh = manifold3d.Mesh64(np.ascontiguousarray(part[0]), np.ascontiguousarray(faces, dtype=np.uint64))
-        return manifold3d.Manifold(mesh)
-
-    whole = [volume_of(part) for part in parts]
-    holes = [volume_of(part, turn=True) for part in cavities or []]
-    if any(m.status() != manifold3d.Error.NoError for m in whole + holes):
+    whole = [as_manifold(*part) for part in parts]
+    holes = [as_manifold(part[0], part[1][:, ::-1]) for part in cavities or []]
+    if any(m is None for m in whole + holes):
         return None
     result = manifold3d.Manifold.batch_boolean(whole, manifold3d.OpType.Add)
     if holes:
         result = result - manifold3d.Manifold.batch_boolean(holes, manifold3d.OpType.Add)
-    mesh = result.to_mesh64()
+    return topology.weld(*mesh_of(result), 0.0)
+
+
+def as_manifold(vertices: Array, faces: IntArray) -> Any:
+    """The mesh as a `manifold3d.Manifold`, or None where it is not a 2-manifold."""
+    import manifold3d
+
+    mesh = manifold3d.Mesh64(np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.uint64))
+    found = manifold3d.Manifold(mesh)
+    return found if found.status() == manifold3d.Error.NoError else None
+
+
+def mesh_of(manifold: Any) -> tuple[Array, IntArray]:
+    """Vertices ``(V, 3)`` and faces ``(F, 3)`` of a `manifold3d.Manifold`."""
+    mesh = manifold.to_mesh64()
     vertices = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3]
-    return topology.weld(vertices, np.asarray(mesh.tri_verts).astype(np.int64), 0.0)
+    return vertices, np.asarray(mesh.tri_verts).astype(np.int64)

@@ -1,0 +1,379 @@
+"""Simplified models of a body: block world, spheres, capsules, convex pieces (K, block world and collision model).
+
+Boxes, spheres and capsules enclose the body: the surface is cut into parts, and each part is held by a shape that
+holds its corners and the rims of the cuts. `Deviation` says how far the model sticks out.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, Self, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, BoolArray, IntArray, as_pose, as_shaped
+from ..errors import InputError
+from . import files, fit, mass, repair, shapes, topology
+from .deviation import Deviation, farthest_of_solid, farthest_of_surface
+from .index import MeshIndex
+from .parts import Cost, partitions
+
+Mesh = tuple[Array, IntArray]
+
+MOST = 512
+"""Most shapes of one model."""
+
+SAMPLES = 8192
+"""Points at which the volumes of unions are compared."""
+
+
+@dataclass(frozen=True, eq=False)
+class Primitives(ABC):
+    """A union of simple convex shapes in the frame of the body (or link)."""
+
+    KIND: ClassVar[str]
+
+    @abstractmethod
+    def __len__(self) -> int: ...
+
+    @abstractmethod
+    def meshes(self) -> list[Mesh]:
+        """One closed mesh per shape; round ones are polyhedra with corners on the shape."""
+
+    @abstractmethod
+    def _distance(self, points: Array) -> Array:
+        """`distance` of ``points (N, 3)``."""
+
+    @abstractmethod
+    def at(self, pose: ArrayLike) -> Self:
+        """The same model moved by *pose* ``(4, 4)``."""
+
+    def _arrays(self) -> dict[str, Any]:
+        """What `save` writes."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    def joined(self, *others: Self) -> Self:
+        """One model of the shapes of this one and of *others*."""
+        together = {f.name: np.concatenate([getattr(m, f.name) for m in (self, *others)]) for f in fields(self)}
+        return replace(self, **together)
+
+    def distance(self, points: ArrayLike) -> Array:
+        """Signed distance ``(...)`` of *points* ``(..., 3)`` from the nearest shape, negative inside.
+
+        Exact outside for boxes, spheres and capsules; for convex pieces, and inside, never larger in size than it is.
+        """
+        p = as_shaped(points, "points", 3)
+        return self._distance(p.reshape(-1, 3)).reshape(p.shape[:-1])
+
+    def inside(self, points: ArrayLike) -> BoolArray:
+        """Whether *points* ``(..., 3)`` lie in one of the shapes."""
+        within: BoolArray = self.distance(points) <= 0.0
+        return within
+
+    @cached_property
+    def bounds(self) -> Array:
+        """Lower and upper corner ``(2, 3)`` of the box around the meshes."""
+        points = np.concatenate([v for v, _ in self.meshes()])
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    @cached_property
+    def union(self) -> Mesh:
+        """The surface of the union of `meshes`, closed."""
+        meshes = self.meshes()
+        whole = repair.union(meshes) if len(meshes) > 1 else meshes[0]
+        return whole if whole is not None else _joined(meshes)
+
+    @property
+    def mesh(self) -> Mesh:
+        """`union`: the model as a surface mesh ``(vertices, faces)``."""
+        return self.union
+
+    @cached_property
+    def volume(self) -> float:
+        """Volume of `union` in m³."""
+        return mass.solid(*self.union).volume
+
+    def deviation(self, body: MeshIndex) -> Deviation:
+        """How much the model differs from *body* (see `Deviation`)."""
+        grown = self.bounds + 0.02 * np.ptp(self.bounds) * np.array([[-1.0], [1.0]])
+        outward = farthest_of_solid(self._distance, grown[0], grown[1], body.signed_distance)[1]
+        volume = mass.solid(body.vertices, body.faces).volume if body.closed else 0.0
+        return Deviation(outward, self._missed(body), self.ENCLOSES, self.volume, max(volume, 0.0))
+
+    def _missed(self, body: MeshIndex) -> float:
+        """How far the body may stick out."""
+        return 0.0
+
+    ENCLOSES: ClassVar[bool] = True
+
+    def save(self, path: str | Path) -> Path:
+        """Write the shapes as ``.npz`` (`load` reads them), or their union as a mesh (``.obj``, ``.stl``, …)."""
+        if Path(path).suffix.lower() in (".npz", ""):
+            return files.write(path, self.KIND, **self._arrays())
+        return files.write_mesh(path, *self.union)
+
+    @classmethod
+    @abstractmethod
+    def load(cls, path: str | Path) -> Self:
+        """The model that `save` wrote as ``.npz``."""
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes(Primitives):
+    """Block world: boxes given by the poses ``(k, 4, 4)`` of their centres and their full extents ``(k, 3)``."""
+
+    poses: Array
+    sizes: Array
+    KIND: ClassVar[str] = "boxes"
+
+    @staticmethod
+    def around(index: MeshIndex, count: int = 1, *, oriented: bool = True) -> Boxes:
+        """At most *count* boxes around the parts of a surface; along the axes unless *oriented*."""
+
+        def make(part: Array) -> Boxes:
+            box = fit.block(part) if oriented else fit.aligned_block(part)
+            return Boxes(box.pose[None], box.size[None])
+
+        return _best(make, index, count, lambda s: float(np.prod(s)))
+
+    def __len__(self) -> int:
+        return len(self.sizes)
+
+    def meshes(self) -> list[Mesh]:
+        """The boxes as meshes."""
+        return [_placed(shapes.box(size), pose) for pose, size in zip(self.poses, self.sizes)]
+
+    def _distance(self, points: Array) -> Array:
+        best = np.full(len(points), np.inf)
+        for pose, size in zip(self.poses, self.sizes):
+            beyond = np.abs((points - pose[:3, 3]) @ pose[:3, :3]) - 0.5 * size
+            outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+            best = np.minimum(best, outside + np.minimum(beyond.max(axis=1), 0.0))
+        return best
+
+    def at(self, pose: ArrayLike) -> Self:
+        """The same boxes moved by *pose* ``(4, 4)``."""
+        return replace(self, poses=as_pose(pose, "pose") @ self.poses)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """The boxes that `save` wrote."""
+        data = files.read(path, cls.KIND)
+        return cls(as_shaped(data["poses"], "poses", 4, 4), as_shaped(data["sizes"], "sizes", 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Spheres(Primitives):
+    """Spheres given by centres ``(k, 3)`` and radii ``(k,)``."""
+
+    centres: Array
+    radii: Array
+    KIND: ClassVar[str] = "spheres"
+
+    @staticmethod
+    def around(index: MeshIndex, count: int = 24) -> Spheres:
+        """At most *count* spheres around the parts of a surface."""
+
+        def make(part: Array) -> Spheres:
+            ball = fit.ball(part)
+            return Spheres(ball.centre[None], np.array([ball.radius]))
+
+        return _best(make, index, count, lambda s: 0.52 * float(s @ s) ** 1.5)
+
+    def __len__(self) -> int:
+        return len(self.radii)
+
+    def meshes(self) -> list[Mesh]:
+        """The spheres as icospheres of 1280 faces."""
+        unit, faces = shapes.sphere(1.0)
+        return [(unit * radius + centre, faces) for centre, radius in zip(self.centres, self.radii)]
+
+    def _distance(self, points: Array) -> Array:
+        best = np.full(len(points), np.inf)
+        for centre, radius in zip(self.centres, self.radii):
+            best = np.minimum(best, np.linalg.norm(points - centre, axis=1) - radius)
+        return best
+
+    def at(self, pose: ArrayLike) -> Self:
+        """The same spheres moved by *pose* ``(4, 4)``."""
+        T = as_pose(pose, "pose")
+        return replace(self, centres=self.centres @ T[:3, :3].T + T[:3, 3])
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """The spheres that `save` wrote."""
+        data = files.read(path, cls.KIND)
+        return cls(as_shaped(data["centres"], "centres", 3), as_shaped(data["radii"], "radii"))
+
+
+@dataclass(frozen=True, eq=False)
+class Capsules(Primitives):
+    """Capsules given by the ends ``(k, 2, 3)`` of their segments and their radii ``(k,)``."""
+
+    ends: Array
+    radii: Array
+    KIND: ClassVar[str] = "capsules"
+
+    @staticmethod
+    def around(index: MeshIndex, count: int = 1) -> Capsules:
+        """At most *count* capsules around the parts of a surface."""
+
+        def cost(s: Array) -> float:
+            c, b, a = np.sort(s)
+            r = 0.5 * np.hypot(b, c)
+            return float(np.pi * r * r * (max(a - r, 0.0) + 4.0 / 3.0 * r))
+
+        def make(part: Array) -> Capsules:
+            capsule = fit.capsule(part)
+            return Capsules(capsule.ends[None], np.array([capsule.radius]))
+
+        return _best(make, index, count, cost)
+
+    def __len__(self) -> int:
+        return len(self.radii)
+
+    def meshes(self) -> list[Mesh]:
+        """The capsules as polyhedra of 32 sides."""
+        return [_capsule(*each) for each in zip(self.ends, self.radii)]
+
+    def _distance(self, points: Array) -> Array:
+        best = np.full(len(points), np.inf)
+        for (a, b), radius in zip(self.ends, self.radii):
+            along, to = b - a, points - a
+            t = np.clip(to @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
+            best = np.minimum(best, np.linalg.norm(to - t[:, None] * along, axis=1) - radius)
+        return best
+
+    def at(self, pose: ArrayLike) -> Self:
+        """The same capsules moved by *pose* ``(4, 4)``."""
+        T = as_pose(pose, "pose")
+        return replace(self, ends=self.ends @ T[:3, :3].T + T[:3, 3])
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """The capsules that `save` wrote."""
+        data = files.read(path, cls.KIND)
+        return cls(as_shaped(data["ends"], "ends", 2, 3), as_shaped(data["radii"], "radii"))
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexPieces(Primitives):
+    """Convex polyhedra ``(vertices, faces)`` that cover the body nearly (`Body.convex_pieces`), not by construction."""
+
+    pieces: tuple[Mesh, ...]
+    KIND: ClassVar[str] = "convex pieces"
+    ENCLOSES: ClassVar[bool] = False
+
+    def __len__(self) -> int:
+        return len(self.pieces)
+
+    def meshes(self) -> list[Mesh]:
+        """The pieces."""
+        return list(self.pieces)
+
+    def _missed(self, body: MeshIndex) -> float:
+        return farthest_of_surface(body.vertices[body.faces], self._outside, self._outside_on)[1]
+
+    def _outside(self, points: Array) -> Array:
+        return np.maximum(self._distance(points), 0.0)
+
+    def _outside_on(self, triangles: Array) -> Array:
+        """What `_outside` does not exceed on triangles ``(N, 3, 3)``: for one piece it is largest at a corner."""
+        least = np.full(len(triangles), np.inf)
+        for planes in self._planes:
+            corners = triangles.reshape(-1, 3) @ planes[:, :3].T - planes[:, 3]
+            least = np.minimum(least, corners.max(axis=1).reshape(-1, 3).max(axis=1))
+        return np.asarray(np.maximum(least, 0.0))
+
+    @cached_property
+    def _planes(self) -> list[Array]:
+        from .convex import _planes
+
+        return [_planes(v[f]) for v, f in self.pieces]
+
+    def _distance(self, points: Array) -> Array:
+        best = np.full(len(points), np.inf)
+        for planes in self._planes:
+            for first in range(0, len(points), 20_000):
+                few = slice(first, first + 20_000)
+                beyond = (points[few] @ planes[:, :3].T - planes[:, 3]).max(axis=1)
+                best[few] = np.minimum(best[few], beyond)
+        return best
+
+    def at(self, pose: ArrayLike) -> Self:
+        """The same pieces moved by *pose* ``(4, 4)``."""
+        T = as_pose(pose, "pose")
+        return replace(self, pieces=tuple(_placed(piece, T) for piece in self.pieces))
+
+    def _arrays(self) -> dict[str, Any]:
+        arrays: dict[str, Any] = {"count": len(self.pieces)}
+        for i, (v, f) in enumerate(self.pieces):
+            arrays[f"v{i}"], arrays[f"f{i}"] = v, f
+        return arrays
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """The pieces that `save` wrote."""
+        data = files.read(path, cls.KIND)
+        return cls(tuple((data[f"v{i}"], data[f"f{i}"]) for i in range(int(data["count"]))))
+
+
+Fitted = TypeVar("Fitted", bound=Primitives)
+
+
+def _best(make: Callable[[Array], Fitted], index: MeshIndex, count: int, cost: Cost) -> Fitted:
+    """The model of at most *count* shapes whose union is smallest, judged by sample points.
+
+    *make* fits one shape to the corners of each part; every part is fitted once.
+    """
+    if not 1 <= count <= MOST:
+        raise InputError(f"count is {count}; expected 1 to {MOST} shapes")
+    low, high = index.tree.boxes[0, :3], index.tree.boxes[0, 3:]
+    points = np.random.default_rng(0).uniform(1.3 * low - 0.3 * high, 1.3 * high - 0.3 * low, (SAMPLES, 3))
+    shapes_of: dict[int, tuple[Fitted, BoolArray, Array]] = {}
+    best: tuple[int, list[Fitted]] | None = None
+    for partition in partitions(index.vertices, index.faces, count, cost):
+        for part in partition:
+            if id(part) not in shapes_of:
+                model = make(part)
+                shapes_of[id(part)] = model, model.inside(points), part
+        covered = int(np.any([shapes_of[id(part)][1] for part in partition], axis=0).sum())
+        if best is None or covered < best[0]:
+            best = covered, [shapes_of[id(part)][0] for part in partition]
+    assert best is not None
+    first, *others = best[1]
+    return first.joined(*others)
+
+
+def _placed(mesh: Mesh, pose: Array) -> Mesh:
+    return mesh[0] @ pose[:3, :3].T + pose[:3, 3], mesh[1]
+
+
+def _joined(meshes: list[Mesh]) -> Mesh:
+    starts = np.cumsum([0, *(len(v) for v, _ in meshes[:-1])])
+    return topology.compact(
+        np.concatenate([v for v, _ in meshes]), np.concatenate([f + s for (_, f), s in zip(meshes, starts)])
+    )
+
+
+def _capsule(ends: Array, radius: float, sides: int = 32, rings: int = 8) -> Mesh:
+    """A capsule as a solid of revolution, its corners on its surface."""
+    along = ends[1] - ends[0]
+    length = float(np.linalg.norm(along))
+    z = along / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+    angle = np.linspace(-0.5 * np.pi, 0.0, rings + 1)
+    lower = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    lower[0, 0] = 0.0
+    profile = np.concatenate([lower, (lower * [1.0, -1.0] + [0.0, length])[::-1]])
+    if length == 0.0:
+        profile = np.delete(profile, rings, axis=0)
+    x = np.cross(np.eye(3)[int(np.abs(z).argmin())], z)
+    x /= np.linalg.norm(x)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = np.stack([x, np.cross(z, x), z], axis=1), ends[0]
+    return _placed(shapes.revolve(profile, sides), pose)
