@@ -11,13 +11,20 @@ import math
 import numpy as np
 
 from ._jit import kernel
-from .timing_rows import WIDE, file_row, row_count, rows_along
+from .timing_cubic import WIDE
+from .timing_rows import file_row, row_count, rows_along
+from .timing_sampled import VALUES
 
 OK = 0
 INFEASIBLE = 1
 START = 2
 END = 3
 STALLED = 4
+
+GRADES = 3
+"""Intervals that are added at either end of a grid: see `subdivide`."""
+GRADED_FROM = 30
+"""Grids of fewer intervals are even."""
 
 
 @kernel
@@ -226,14 +233,36 @@ def split_evenly(breaks, count, least, parts):
 
 
 @kernel
+def grid_parts(breaks, count, least, parts):
+    """`split_evenly` less the intervals that `subdivide` adds at the ends; returns the size of the grid, in intervals."""
+    extra = 2 * GRADES if count >= GRADED_FROM else 0
+    return split_evenly(breaks, count - extra, least, parts) + extra
+
+
+@kernel
 def subdivide(breaks, parts, out):
-    """The grid with ``parts (K,)`` equal intervals in every piece."""
+    """The grid with ``parts (K,)`` equal intervals in every piece; the first and the last one are divided further
+    where *out* has room, ever finer towards the end: next to rest, a constant acceleration serves badly over a long
+    way."""
     i = 0
+    total = 0
+    for k in range(parts.shape[0]):
+        total += parts[k]
+    graded = out.shape[0] - 1 > total
     for k in range(parts.shape[0]):
         m = parts[k]
+        width = breaks[k + 1] - breaks[k]
         for p in range(m):
-            out[i] = breaks[k] + (breaks[k + 1] - breaks[k]) * (p / m)
+            out[i] = breaks[k] + width * (p / m)
             i += 1
+            if graded and k == 0 and p == 0:
+                for g in range(GRADES):
+                    out[i] = breaks[0] + width / m * 4.0 ** (g - GRADES)
+                    i += 1
+            if graded and k == parts.shape[0] - 1 and p == m - 1:
+                for g in range(GRADES):
+                    out[i] = breaks[-1] - width / m * 4.0 ** (-1 - g)
+                    i += 1
     out[i] = breaks[-1]
 
 
@@ -265,12 +294,12 @@ def solve_into(
 ):
     """The profile of one path; ``rows (blocks, (3 R + 2) WIDE)`` and ``pinned (N + 1,)`` are scratch."""
     count = grid.shape[0] - 1
-    size = row_count(coefficients.shape[1] - 1, coefficients.shape[2], sampled.shape[2])
+    size = row_count(coefficients.shape[1] - 1, coefficients.shape[2], sampled.shape[1] // (VALUES * WIDE))
     rows_along(breaks, coefficients, grid, vlim, alim, sampled, bounds, binomial, rows)
     for i in range(count + 1):
         pinned[i] = False
     kinks(breaks, coefficients, grid, pinned)
-    simple = sampled.shape[2] == 0
+    simple = sampled.shape[1] == 0
     status, stage = profile(grid, rows, size, pinned, x_start, x_end, simple, alpha, beta, x)
     if status == OK:
         if collapses(x, pinned):

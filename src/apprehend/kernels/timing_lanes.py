@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ._jit import kernel
-from .timing import OK, duration, kinks, solve_into, split_evenly, subdivide
+from .timing import OK, duration, grid_parts, kinks, solve_into, subdivide
 from .timing_cubic import MASK, WIDE, WORK, cubic_rows, shifted
 from .timing_rows import row_count
 
@@ -233,9 +233,9 @@ def _mended(grid, x, pinned, good, seconds):
 
 @kernel
 def shares(breaks, first, count, least, parts, totals):
-    """`timing.split_evenly` for every path; *parts* ``(all pieces)``, *totals* ``(P,)``."""
+    """`timing.grid_parts` for every path; *parts* ``(all pieces)``, *totals* ``(P,)``."""
     for p in range(totals.shape[0]):
-        totals[p] = split_evenly(
+        totals[p] = grid_parts(
             breaks[first[p] + p : first[p + 1] + p + 1], count, least, parts[first[p] : first[p + 1]]
         )
 

@@ -13,12 +13,13 @@ import numpy as np
 
 from ._jit import kernel
 from .timing_cubic import MASK, WIDE, WORK, cubic_rows, shifted
+from .timing_sampled import ROWS, VALUES, sampled_rows
 
 
 @kernel
 def row_count(degree, n, sampled):
     """Rows per interval: acceleration, velocity (all coordinates in one), sampled constraints."""
-    return degree * n + 2 * degree - 1 + 4 * sampled
+    return degree * n + 2 * degree - 1 + ROWS * sampled
 
 
 @kernel
@@ -205,31 +206,6 @@ def velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, wo
 
 
 @kernel
-def _sampled_rows(i, lane, inv_h, sampled, bounds, r, size, out):
-    """Rows of the sampled constraints ``lo ≤ A u + B x + C ≤ hi`` of interval i, taken as quadratic in σ.
-
-    ``sampled (N, 3, E, 3)``: A, B, C at the start, middle and end of every interval; ``bounds (N, E, 2)``.
-    """
-    f = np.empty((3, 3))
-    for e in range(sampled.shape[2]):
-        for c in range(3):
-            f[c, 0] = sampled[i, 0, e, c]
-            f[c, 2] = sampled[i, 2, e, c]
-            f[c, 1] = 2.0 * sampled[i, 1, e, c] - 0.5 * (f[c, 0] + f[c, 2])
-        for k in range(4):
-            # degree 3: A and C raised by one degree, B times x (1 − σ) + y σ
-            left = (3 - k) / 3.0
-            right = k / 3.0
-            A = (left * f[0, k] if k < 3 else 0.0) + (right * f[0, k - 1] if k > 0 else 0.0)
-            C = (left * f[2, k] if k < 3 else 0.0) + (right * f[2, k - 1] if k > 0 else 0.0)
-            half = 0.5 * A * inv_h
-            a = (left * f[1, k] if k < 3 else 0.0) - half
-            b = (right * f[1, k - 1] if k > 0 else 0.0) + half
-            file_row(a, b, bounds[i, e, 0] - C, bounds[i, e, 1] - C, r, lane, size, out)
-            r += 1
-
-
-@kernel
 def load_block(coefficients, piece, shift, local):
     """Taylor coefficients of the pieces ``piece (WIDE)`` at the offsets z, scaled by h; ``shift`` holds z, h, 1/h."""
     degree = coefficients.shape[1] - 1
@@ -267,11 +243,14 @@ def load_block(coefficients, piece, shift, local):
 
 @kernel
 def rows_along(breaks, coefficients, grid, vlim, alim, sampled, bounds, binomial, out):
-    """Rows of all intervals of one path ``out (blocks, (3 R + 2) WIDE)``; lane l of block b: interval ``b WIDE + l``."""
+    """Rows of all intervals of one path ``out (blocks, (3 R + 2) WIDE)``; lane l of block b: interval ``b WIDE + l``.
+
+    ``sampled (blocks, E VALUES WIDE)`` and ``bounds (blocks, E 2 WIDE)`` as in `timing_sampled`.
+    """
     degree = coefficients.shape[1] - 1
     n = coefficients.shape[2]
     count = grid.shape[0] - 1
-    size = row_count(degree, n, sampled.shape[2])
+    size = row_count(degree, n, sampled.shape[1] // (VALUES * WIDE))
     local = np.zeros((degree + 1) * n * WIDE)
     c = np.empty(3 * n * WIDE)
     shift = np.empty(3 * WIDE)
@@ -298,7 +277,5 @@ def rows_along(breaks, coefficients, grid, vlim, alim, sampled, bounds, binomial
         else:
             load_block(coefficients, piece, shift, local)
             r = velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, work, size, out[block])
-        if sampled.shape[2] > 0:
-            for lane in range(WIDE):
-                i = min(block * WIDE + lane, count - 1)
-                _sampled_rows(i, lane, shift[2 * WIDE + lane], sampled, bounds, r, size, out[block])
+        if sampled.shape[1] > 0:
+            sampled_rows(sampled[block], bounds[block], shift[WIDE : 2 * WIDE], r, size, work, out[block])

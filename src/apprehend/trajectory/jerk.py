@@ -166,7 +166,7 @@ class _PathJerk:
 
     def rows(self, path: PolynomialPath, s: Array) -> Rows:
         """One row: x over its largest value."""
-        B = (np.abs(path(s, 3)) / self.jerk).max(axis=1, keepdims=True) ** (2.0 / 3.0)
+        B = (np.abs(path(s, 3)) / self.jerk).max(axis=-1, keepdims=True) ** (2.0 / 3.0)
         return Rows(np.zeros_like(B), B, np.zeros_like(B), np.full(1, -np.inf), np.ones(1), ("jerk of the path",))
 
 

@@ -49,6 +49,12 @@ class Limits:
             values["position"] = np.stack([lower, upper], axis=-1)
         return cls(**values)
 
+    @property
+    def bounded(self) -> bool:
+        """Whether there is any finite bound."""
+        given = [getattr(self, name) for name in _ORDERS]
+        return any(v is not None and np.isfinite(np.asarray(v, dtype=np.float64)).any() for v in given)
+
     def pairs(self, name: str, n: int) -> Array:
         """The bounds *name* as ``(n, 2)`` pairs (lowest, highest); ±inf where there is none."""
         value = getattr(self, name)

@@ -16,8 +16,9 @@ from ..kernels import path as path_kernels
 from ..kernels import timing as kernels
 from ..kernels import timing_rows as rows_of
 from ..kernels.timing_cubic import WIDE
+from ..kernels.timing_sampled import ROWS
 from ..result import Result, Status
-from .constraints import Constraint, PowerLimits
+from .constraints import Constraint
 from .limits import LimitReport, Limits
 from .motion import Trajectory
 from .path import Path, PolynomialPath, as_polynomial
@@ -29,6 +30,12 @@ MARGIN_ROUNDS = 8
 """Rounds in which the margin of sampled constraints grows to what the speeds found need."""
 POWER_ROUNDS = 24
 """Timings tried for power limits, each starting from the speeds of the one before."""
+POWER_GAIN = 3e-4
+"""Share of the duration below which a further one is not tried."""
+WIDEST_MARGIN = 0.01
+"""Share of a sampled limit that an interval may hold back before it is divided."""
+REFINEMENTS = 3
+"""How often the intervals of a grid are divided for that."""
 
 
 class TimingStatus(Status):
@@ -48,7 +55,8 @@ class Timing(Result):
 
     ``grid (N + 1,)``, ``speed (N + 1,)`` and ``t (N + 1,)`` hold s, ṡ and the time at the grid points. ``s`` and
     ``reason`` name the place and the constraint of a failure; ``margin`` is the largest share of a sampled limit
-    (torque, Cartesian) that was held back for what its functions do between the samples.
+    (torque, power, Cartesian) that was held back for what its functions do between the samples, which ``sampled``
+    describes.
     """
 
     status: TimingStatus
@@ -61,6 +69,7 @@ class Timing(Result):
     s: float | None = None
     reason: str = ""
     margin: float = 0.0
+    sampled: Sampled | None = None
 
     def explain(self) -> str:
         """The outcome, with the place and the constraint of a failure."""
@@ -86,6 +95,22 @@ class Timing(Result):
     def report(self) -> LimitReport:
         """The proof that velocity and acceleration keep their limits at all times, with the largest excess."""
         return self.motion.check(self.limits)
+
+    @cached_property
+    def violation(self) -> float:
+        """Largest excess over any limit at any time, relative to the limit: a proven bound, at most 1e-9.
+
+        It covers the sampled constraints too; for those that state no error of their own see `proven`.
+        """
+        kept = self.report.violation if self.limits.bounded else 0.0
+        self.require_success()
+        return kept if self.sampled is None else max(kept, self.sampled.excess(self.speed**2, self.grid))
+
+    @property
+    def proven(self) -> bool:
+        """Whether `violation` is proven: it is, but for constraints of the caller's that estimate what they do between
+        the samples (`Rows.error`)."""
+        return self.sampled is None or self.sampled.proven
 
 
 def profile_timing(path: PolynomialPath, limits: Limits, grid: Array, x: Array) -> Timing:
@@ -132,23 +157,32 @@ def time_optimal(
             raise InputError(f"{name} is {speed}; expected ṡ ≥ 0 along the path")
     if not constraints and not np.isfinite(alim).all():
         _refuse_unbounded(curve, alim)
+    adaptive = isinstance(grid, (int, np.integer))
     while True:
         problem = _Problem(
             curve, limits, make_grid(curve, grid, least), vlim * (1.0 - MARGIN), alim * (1.0 - MARGIN),
             float(start_speed), float(end_speed),
         )  # fmt: skip
-        timing = problem.solve(None) if not constraints else _constrained(problem, constraints)
+        timing = _constrained(problem, constraints, adaptive) if constraints else problem.solve(None)
         # between two rests it takes at least two intervals: a coarse grid is refined
-        if timing.status is not TimingStatus.STALLED or not isinstance(grid, (int, np.integer)) or least >= 64:
+        if timing.status is not TimingStatus.STALLED or not adaptive or least >= 64:
             return timing
         least = 2 * least
 
 
-def _constrained(problem: _Problem, constraints: Sequence[Constraint]) -> Timing:
-    found = sample(problem.path, problem.grid, constraints)
-    timing = _with_margins(problem, found, power_of=None)
-    if timing.success and any(isinstance(c, PowerLimits) for c in constraints):
-        timing = _within_power(problem, found, timing)
+def _constrained(problem: _Problem, constraints: Sequence[Constraint], adaptive: bool) -> Timing:
+    """The timing with sampled constraints; intervals whose quartics leave out too much of a limit are divided."""
+    for last in range(REFINEMENTS, -1, -1):
+        found = sample(problem.path, problem.grid, constraints)
+        timing, shares = _with_margins(problem, found, None)
+        if timing.success and found.power.any():
+            timing, shares = _within_power(problem, found, timing)
+        parts = np.where(shares > WIDEST_MARGIN, np.ceil(np.minimum(5.0 * shares / WIDEST_MARGIN, 1e4) ** 0.2), 1.0)
+        if not adaptive or last == 0 or parts.max() == 1.0:
+            break
+        grid = problem.grid
+        inner = [np.linspace(a, b, int(k) + 1)[:-1] for a, b, k in zip(grid[:-1], grid[1:], parts)]
+        problem = replace(problem, grid=np.concatenate([*inner, grid[-1:]]))
     return timing
 
 
@@ -165,10 +199,10 @@ class _Problem:
     def solve(self, sampled: Sampled | None) -> Timing:
         count = self.grid.size - 1
         x, alpha, beta = np.zeros((3, count + 1))
-        values, bounds = (NO_SAMPLES, NO_BOUNDS) if sampled is None else (sampled.values, sampled.bounds)
+        values, bounds = (NO_SAMPLES, NO_BOUNDS) if sampled is None else sampled.in_blocks()
         coefficients = self.path.at_least_cubic
         degree = coefficients.shape[1] - 1
-        rows = 3 * rows_of.row_count(degree, self.path.n, values.shape[2]) + 2
+        rows = 3 * rows_of.row_count(degree, self.path.n, 0 if sampled is None else len(sampled.names)) + 2
         scratch = np.empty((-(-count // WIDE), rows * WIDE))
         status, stage = kernels.solve_into(
             self.path.breaks, coefficients, self.grid, self.vlim, self.alim, values, bounds,
@@ -205,55 +239,65 @@ class _Problem:
         )  # fmt: skip
 
 
-def _with_margins(problem: _Problem, found: Sampled, power_of: Array | None) -> Timing:
-    """Solve, bound what the sampled functions do between their samples at the speeds found, and tighten by that."""
+def _with_margins(problem: _Problem, found: Sampled, tangent: Array | None) -> tuple[Timing, Array]:
+    """Solve, bound what the sampled functions do between their samples at the speeds found, and tighten by that.
+
+    Returns the timing, and the share of a limit that every interval holds back ``(N,)``.
+    """
     margins = np.zeros(found.bounds.shape[:2])
+    exact = found.tightened(0.0, tangent)
     for _ in range(MARGIN_ROUNDS):
-        timing = problem.solve(found.tightened(margins, power_of))
+        timing = problem.solve(found.tightened(margins, tangent))
         if not timing.success:
-            return timing
-        short = found.remainder(timing.speed**2, problem.grid) - margins
-        if (short <= 1e-13).all():
-            return replace(timing, margin=found.share(margins))
+            return timing, exact.shares(margins, timing.speed**2, problem.grid)
+        short = exact.remainder(timing.speed**2, problem.grid) - margins
+        if (short <= 0.0).all():
+            shares = exact.shares(margins, timing.speed**2, problem.grid)
+            return replace(timing, margin=float(shares.max()), sampled=exact), shares
         margins += 1.25 * np.maximum(short, 0.0)
     i, e = (int(k) for k in np.unravel_index(short.argmax(), short.shape))
     reason = f"{found.names[e]} varies too fast between the samples of this grid"
-    return replace(timing, status=TimingStatus.COARSE, s=float(problem.grid[i]), reason=reason)
+    shares = exact.shares(margins, timing.speed**2, problem.grid)
+    return replace(timing, status=TimingStatus.COARSE, s=float(problem.grid[i]), reason=reason), shares
 
 
-def _within_power(problem: _Problem, found: Sampled, timing: Timing) -> Timing:
-    """Timings within the power limits: the speed of one bounds the next, which may use the power that this frees."""
-    x = timing.speed**2
-    # a share of the power for gravity alone bounds the speed to begin with
-    still = np.abs(found.values[:, :, found.power, 2]).max(axis=1)
+def _within_power(problem: _Problem, found: Sampled, timing: Timing) -> tuple[Timing, Array]:
+    """Timings within the power limits, with their tangents at the speeds of the one before: each is feasible for the
+    next, so that the duration falls."""
+    # the power that gravity alone takes bounds the speed to begin with
+    still = np.abs(found.samples[:, :, found.power, 2]).max(axis=1)
     with np.errstate(divide="ignore"):
         rest = (0.7 * found.bounds[:, found.power, 1] / still).min(axis=1)
-    bound = np.minimum(np.maximum(x[1:], x[:-1]), rest**2)
-    best: Timing | None = None
-    kept = bound
+    tangent = np.minimum(_middle(timing), rest**2)
+    best: tuple[Timing, Array] | None = None
     for _ in range(POWER_ROUNDS):
-        timing = _with_margins(problem, found, power_of=bound)
-        if not timing.success:
-            bound = 0.25 * bound if best is None else np.sqrt(bound * kept)
+        made = _with_margins(problem, found, tangent)
+        if not made[0].success:
+            if best is not None:
+                return best
+            tangent = 0.25 * tangent
             continue
-        if best is None or timing.t[-1] < best.t[-1]:
-            best, kept = timing, bound
-        x = timing.speed**2
-        top = np.maximum(np.maximum(x[1:], x[:-1]), 1e-9 * bound)
-        bound = np.sqrt(bound * top) * np.clip(1.0 / found.power_share(x, problem.grid), 1.0, 1.6)
-    return timing if best is None else best
+        if best is not None and made[0].t[-1] > (1.0 - POWER_GAIN) * best[0].t[-1]:
+            return min(best, made, key=lambda m: float(m[0].t[-1]))
+        best = made
+        tangent = np.maximum(_middle(made[0]), 1e-12 * tangent)
+    return made if best is None else best
+
+
+def _middle(timing: Timing) -> Array:
+    """Path speed squared in the middle of every interval ``(N,)``."""
+    x = timing.speed**2
+    return np.asarray(0.5 * (x[1:] + x[:-1]))
 
 
 def conflict(
     path: PolynomialPath, grid: Array, stage: int, vlim: Array, alim: Array, sampled: Sampled | None, y_high: float
 ) -> str:
     """Which rows of interval *stage* exclude every speed, in words."""
-    values, bounds = (NO_SAMPLES, NO_BOUNDS) if sampled is None else (
-        sampled.values[stage : stage + 1], sampled.bounds[stage : stage + 1]
-    )  # fmt: skip
+    values, bounds = (NO_SAMPLES, NO_BOUNDS) if sampled is None else sampled.of_interval(stage).in_blocks()
     coefficients = path.at_least_cubic
     degree = coefficients.shape[1] - 1
-    rows = int(rows_of.row_count(degree, path.n, values.shape[2]))
+    rows = int(rows_of.row_count(degree, path.n, 0 if sampled is None else len(sampled.names)))
     table = np.empty((1, (3 * rows + 2) * WIDE))
     rows_of.rows_along(
         path.breaks, coefficients, grid[stage : stage + 2], vlim, alim, values, bounds,
@@ -261,15 +305,16 @@ def conflict(
     )  # fmt: skip
     _, low, high = table[0].reshape(-1, WIDE)[: 3 * rows, 0].reshape(rows, 3).T
     if sampled is not None:
-        still = sampled.values[stage, :, :, 2]
-        excess = np.maximum(still - sampled.bounds[stage, :, 1], sampled.bounds[stage, :, 0] - still).max(axis=0)
+        still = sampled.samples[stage, :, :, 2]
+        low, high = sampled.bounds[stage, : still.shape[1]].T
+        excess = np.maximum(still - high, low - still).max(axis=0)
         e = int(excess.argmax())
         if excess[e] > 0.0:
             value = still[np.abs(still[:, e]).argmax(), e]
             return f"{sampled.names[e]} is {value:.6g} even at rest; the limit is {sampled.bounds[stage, e].tolist()}"
     names = [f"acceleration of coordinate {j}" for j in range(path.n) for _ in range(degree)]
     names += ["velocity"] * (2 * degree - 1)
-    names += [name for name in (sampled.names if sampled is not None else ()) for _ in range(4)]
+    names += [name for name in (sampled.names if sampled is not None else ()) for _ in range(ROWS)]
     top, bottom = int(high.argmin()), int(low.argmax())
     upper = names[top] if high[top] < y_high else "the speed that can still be braked further on"
     return f"{names[bottom]} and {upper} contradict each other at every speed"
@@ -282,7 +327,7 @@ def make_grid(path: PolynomialPath, grid: int | ArrayLike, least: int = 1) -> Ar
         if grid < 1:
             raise InputError(f"grid is {grid}; expected a number of intervals ≥ 1, or the grid points")
         parts = np.empty(breaks.size - 1, dtype=np.int64)
-        out = np.empty(kernels.split_evenly(breaks, int(grid), least, parts) + 1)
+        out = np.empty(kernels.grid_parts(breaks, int(grid), least, parts) + 1)
         kernels.subdivide(breaks, parts, out)
         return out
     points = as_array(grid, "grid")
@@ -319,5 +364,5 @@ def binomials(size: int) -> Array:
     return table
 
 
-NO_SAMPLES = np.empty((1, 3, 0, 3))
-NO_BOUNDS = np.empty((1, 0, 2))
+NO_SAMPLES = np.empty((1, 0))
+NO_BOUNDS = np.empty((1, 0))
