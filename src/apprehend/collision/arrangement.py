@@ -16,6 +16,7 @@ from ..kernels import collide
 from ..kernels.collide import CollideModel
 from ..kernels.sphere import SphereModel
 from ..kinematics import Robot
+from .geometry import Geometry
 from .lanes_model import sphere_model
 from .nodes import (
     Node,
@@ -28,7 +29,8 @@ from .nodes import (
     neighbours,
     pair,
 )
-from .shapes import Convex, hulls
+from .obstacles import as_geometry
+from .shapes import Convex
 
 if TYPE_CHECKING:
     from ..bodies import Body
@@ -161,7 +163,7 @@ class Arrangement:
 
     def attach(
         self,
-        body: Body | Sequence[Convex],
+        body: Body | Geometry | Sequence[Geometry],
         frame: str,
         pose: ArrayLike,
         *,
@@ -174,6 +176,11 @@ class Arrangement:
         hand and its fingers).
         """
         shapes, name = _shapes_of(body, name)
+        for shape in shapes:
+            if not isinstance(shape, Convex):
+                raise InputError(
+                    f"{name!r} has a {type(shape).__name__}; only bodies and convex shapes can be attached"
+                )
         f = self.robot.frame_index(frame)
         tree = self.robot.model
         carrier = int(tree.frame_joint[f])
@@ -208,11 +215,15 @@ class Arrangement:
             others = (*others, Node(name, -1, tuple(shape.at(T) for shape in node.shapes)))
         return self._with(others, reasons)
 
-    def add(self, name: str, body: Body | Sequence[Convex], pose: ArrayLike) -> Self:
-        """The model with one more obstacle, or with another one of that name, at *pose* (T_world_body)."""
+    def add(self, name: str, body: Body | Geometry | Sequence[Geometry], pose: ArrayLike | None = None) -> Self:
+        """The model with one more obstacle, or with another one of that name, at *pose* (T_world_body).
+
+        An obstacle is a body (its convex pieces), a distance field of one, or geometry of any kind: `Convex`,
+        `HalfSpace`, `Cloud`, `Union`, `Grid`, or several of them.
+        """
         if name in self.robot.frame_names:
             raise InputError(f"{name!r} is a link of the robot; an obstacle needs another name")
-        T = as_pose(pose, "pose")
+        T = np.eye(4) if pose is None else as_pose(pose, "pose")
         node = Node(name, -1, tuple(shape.at(T) for shape in _shapes_of(body, name)[0]))
         return self._with((*(n for n in self.nodes if n.name != name), node), self.reasons)
 
@@ -253,12 +264,11 @@ class Arrangement:
         return self._lanes
 
 
-def _shapes_of(body: Body | Sequence[Convex], name: str | None) -> tuple[tuple[Convex, ...], str]:
-    if isinstance(body, Sequence):
-        if not body or name is None:
-            raise InputError("shapes need a name, and at least one of them")
-        return tuple(body), name
-    return hulls(body.convex_pieces), name or body.name
+def _shapes_of(body: Body | Geometry | Sequence[Geometry], name: str | None) -> tuple[tuple[Geometry, ...], str]:
+    name = name or getattr(body, "name", None)
+    if not name:
+        raise InputError("shapes need a name, and at least one of them")
+    return as_geometry(body, name), name
 
 
 def obstacle_nodes(scene: Scene | None) -> tuple[Node, ...]:
@@ -267,7 +277,7 @@ def obstacle_nodes(scene: Scene | None) -> tuple[Node, ...]:
         return ()
     boxes = tuple(Node(box.name, -1, (Convex.box(box.size).at(box.pose),)) for box in scene.boxes)
     bodies = tuple(
-        Node(name, -1, tuple(shape.at(placed.pose) for shape in hulls(placed.body.convex_pieces)))
+        Node(name, -1, tuple(shape.at(placed.pose) for shape in as_geometry(placed.body, name)))
         for name, placed in scene.bodies.items()
     )
     return boxes + bodies

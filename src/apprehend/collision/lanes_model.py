@@ -7,12 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Array
+from ..kernels import sphere_near
 from ..kernels.collide import CollideModel
-from ..kernels.gjk import BOX, CYLINDER, HULL
+from ..kernels.gjk import BOX, CYLINDER, HALF_SPACE, HULL
 from ..kernels.sphere import SphereModel
+from .cells import cell_table
+from .geometry import Geometry
 from .nodes import Node
+from .obstacles import Union
 from .shapes import Convex
 from .spheres import cover
+
+FEW = 64
+"""Unions of no more shapes than this are taken apart; others get a table of cells."""
 
 FINEST = 0.045
 """A link is not split into spheres smaller than this share of the robot's reach."""
@@ -23,28 +30,21 @@ def sphere_model(exact: CollideModel, nodes: Sequence[Node], clearance: float) -
 
     Standing shapes that a link cannot come as near as *clearance* to are left out.
 
-    It decides where links are spheres and what stands around boxes, cylinders, spheres and capsules.
+    It decides where links are spheres and what stands around boxes, cylinders, spheres, capsules and half-spaces.
     """
     m = len(exact.links)
-    decides = True
     moving = [k for k, node in enumerate(nodes) if node.carrier >= 0]
     based = [k for k, node in enumerate(nodes) if node.carrier < 0]
     small = FINEST * max((float(exact.nodes[k, 5:].max(initial=0.0)) for k in moving), default=1.0)
-    fixed: list[list[float]] = []
-    fixed_of: dict[int, list[int]] = {}
-    for k in based:
-        rows = [fixed_row(shape) for shape in nodes[k].shapes]
-        fixed_of[k] = list(range(len(fixed), len(fixed) + len(rows)))
-        fixed += [row for row, _ in rows]
-        if not all(exactly for _, exactly in rows):
-            decides = False
+    table_of = _Fixed()
+    standing = {k: [o for shape in nodes[k].shapes for o in table_of.add(shape)] for k in based}
     number = {k: i for i, k in enumerate(moving)}
     spheres: list[Array] = []
     parts, count = [], 0
     for k in moving:
-        balls = np.concatenate([cover(shape, small=small) for shape in nodes[k].shapes])
+        balls = np.concatenate([cover(shape, small=small) for shape in nodes[k].shapes if isinstance(shape, Convex)])
         if any(shape.kind != HULL or len(shape.points) != 1 for shape in nodes[k].shapes):
-            decides = False
+            table_of.decides = False
         spheres.append(balls)
         parts.append((nodes[k].carrier, count, count + len(balls)))
         count += len(balls)
@@ -56,7 +56,8 @@ def sphere_model(exact: CollideModel, nodes: Sequence[Node], clearance: float) -
             selves.append([number[a], number[b], *row[4:]])
         else:
             centre, radius = reachable(exact, int(nodes[a].carrier), table[number[a]])
-            meets += [(number[a], o) for o in fixed_of[b] if gap(fixed[o], centre) <= radius + clearance]
+            near = [o for o in standing[b] if gap(table_of.shapes[o], centre) <= radius + clearance]
+            meets += [(number[a], o) for o in near]
     return SphereModel(
         links=exact.links,
         joints=exact.joints,
@@ -64,10 +65,45 @@ def sphere_model(exact: CollideModel, nodes: Sequence[Node], clearance: float) -
         nodes=table.reshape(len(moving), 5 + m),
         parts=np.array(parts, np.int64).reshape(-1, 3),
         selves=np.array(selves, np.int64).reshape(-1, 2 + m),
-        fixed=np.array(fixed, np.float64).reshape(-1, 17),
+        fixed=np.array(table_of.rows, np.float64).reshape(-1, 17),
         meets=np.array(meets, np.int64).reshape(-1, 2),
-        decides=np.array([decides], np.int64),
+        decides=np.array([table_of.decides], np.int64),
+        shapes=np.array(table_of.counts, np.int64).reshape(-1, 3),
+        cells=np.concatenate([np.zeros(0, np.float32), *table_of.cells]),
     )
+
+
+class _Fixed:
+    """Collects what stands around."""
+
+    def __init__(self) -> None:
+        self.rows: list[list[float]] = []
+        self.shapes: list[Geometry] = []
+        self.counts: list[tuple[int, ...]] = []
+        self.cells: list[Array] = []
+        self.total = 0
+        self.decides = True
+
+    def add(self, shape: Geometry) -> list[int]:
+        """The numbers of the rows that stand for *shape*."""
+        if isinstance(shape, Union) and len(shape.shapes) <= FEW:
+            return [o for part in shape.shapes for o in self.add(part.at(shape.pose))]
+        self.shapes.append(shape)
+        counts: tuple[int, ...] = (0, 0, 0)
+        if shape.kind > HALF_SPACE:
+            corner, side, bounds = cell_table(shape)
+            place = shape.pose[:3, 3] + shape.pose[:3, :3] @ corner
+            self.rows.append([*shape.pose[:3, :3].ravel(), *place, 1.0 / side, self.total, 0.0, 0.0, sphere_near.GRID])
+            self.cells.append(bounds.ravel())
+            self.total += bounds.size
+            self.decides = False
+            counts = bounds.shape
+        else:
+            row, exactly = fixed_row(shape)
+            self.rows.append(row)
+            self.decides &= exactly
+        self.counts.append(counts)
+        return [len(self.rows) - 1]
 
 
 def _row(node: Array, balls: Array) -> Array:
@@ -91,19 +127,23 @@ def reachable(exact: CollideModel, carrier: int, row: Array) -> tuple[Array, flo
     return exact.joints[carrier, 9:12], radius * (1.0 + 1e-12) if exact.links[carrier, 1] == 0 else np.inf
 
 
-def gap(row: list[float], point: Array) -> float:
-    """Distance of a point to the box around a standing shape."""
-    local = (point - np.array(row[9:12])) @ np.array(row[:9]).reshape(3, 3)
-    return float(np.linalg.norm(np.maximum(np.abs(local) - row[12:15], 0.0))) - row[15]
+def gap(shape: Geometry, point: Array) -> float:
+    """A lower bound on the distance of a point to a standing shape."""
+    local = (point - shape.pose[:3, 3]) @ shape.pose[:3, :3]
+    if shape.kind == HALF_SPACE:
+        return float(local[2])
+    return float(np.linalg.norm(np.maximum(np.abs(local) - shape.half, 0.0)))
 
 
-def fixed_row(shape: Convex) -> tuple[list[float], bool]:
+def fixed_row(shape: Geometry) -> tuple[list[float], bool]:
     """A standing shape as a row of ``SphereModel.fixed``, and whether that is exact."""
     pose = [*shape.pose[:3, :3].ravel(), *shape.pose[:3, 3]]
     if shape.kind == BOX:
         return [*pose, *shape.size, shape.radius, 0.0], True
     if shape.kind == CYLINDER:
         return [*pose, shape.size[0], shape.size[0], shape.size[1], shape.radius, 1.0], True
+    if shape.kind == HALF_SPACE:
+        return [*pose, 0.0, 0.0, 0.0, 0.0, sphere_near.HALF_SPACE], True
     half = shape.half - shape.radius
     exactly = shape.kind == HULL and len(shape.points) <= 2
     if exactly:  # a point, or a segment along an axis of its box

@@ -13,7 +13,8 @@ from ..kernels.collide import CollideModel
 from ..kernels.tree import TreeModel
 from ..kinematics import Robot
 from ..robots.description import Description, JointType
-from .shapes import Convex, link_shapes, pack
+from .geometry import Geometry, pack
+from .shapes import Convex, link_shapes
 
 UNBOUNDED_TRAVEL = 100.0
 """Travel in m that is assumed for a sliding joint without limits when the motion of what it carries is bounded."""
@@ -27,7 +28,7 @@ class Node:
 
     name: str
     carrier: int
-    shapes: tuple[Convex, ...]
+    shapes: tuple[Geometry, ...]
     attached_to: str | None = None  # frame that an attached body moves with
     pose: Array | None = None  # of an attached body in that frame
 
@@ -140,6 +141,8 @@ def node_ball(node: Node) -> Array:
     """A sphere (centre, radius) that holds the node, in its carrier (Ritter's two passes over the shapes' spheres)."""
     centres = np.array([shape.ball[0] for shape in node.shapes])
     radii = np.array([shape.ball[1] for shape in node.shapes])
+    if np.isinf(radii).any():
+        return np.array([0.0, 0.0, 0.0, np.inf])
     centre = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
     radius = float((np.linalg.norm(centres - centre, axis=1) + radii).max())
     return np.array([*centre, radius * (1.0 + 1e-12)])
@@ -149,10 +152,10 @@ def compile_model(robot: Robot, nodes: Sequence[Node], blocks: Iterable[tuple[in
     """Arrays for the kernels; *blocks* are pairs of indices into *nodes*, in the order in which they are tested."""
     tree = robot.model
     shapes = [shape for node in nodes for shape in node.shapes]
-    ints, floats, points, graph = pack(shapes)
+    arrays = pack(shapes)
     start = np.cumsum([0] + [len(node.shapes) for node in nodes])
     for k, node in enumerate(nodes):
-        ints[start[k] : start[k + 1], 3] = node.carrier
+        arrays.ints[start[k] : start[k + 1], 3] = node.carrier
     m = len(tree.kind)
     rows: list[list[int]] = []
     pairs: list[tuple[int, int]] = []
@@ -165,10 +168,7 @@ def compile_model(robot: Robot, nodes: Sequence[Node], blocks: Iterable[tuple[in
     return CollideModel(
         links=np.stack([tree.parent, tree.kind, tree.coordinate], axis=1),
         joints=np.concatenate([tree.place, tree.gain], axis=1),
-        ints=ints,
-        floats=floats,
-        points=points,
-        graph=graph,
+        shapes=arrays,
         nodes=np.array(parts, np.float64).reshape(len(nodes), 5 + m),
         blocks=np.array(rows, np.int64).reshape(len(rows), 4 + m),
         pairs=np.array(pairs, np.int64).reshape(-1, 2),

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, IntArray, as_pose, as_shaped, as_vector
+from ..arrays import Array, IntArray, as_shaped, as_vector
 from ..errors import InputError
 from ..kernels.gjk import BOX, CONE, CYLINDER, ELLIPSOID, HULL
 from ..robots import load_shape_mesh
 from ..robots.description import Link, Shape, ShapeKind
+from .geometry import ROUND_OFF, Geometry, positive
 
 FILLED = 0.85
 """A closed mesh that fills this share of its convex hull is taken as the hull; others are cut into a few hulls."""
 
-ROUND_OFF = 1e-9
-"""Bounds of shapes are enlarged by this share, so that rounding never makes them too small."""
-
 
 @dataclass(frozen=True, eq=False)
-class Convex:
+class Convex(Geometry):
     """A convex core grown by a radius, at a pose in the frame of what carries it (a link, a body, or the world).
 
     A sphere is a grown point and a capsule a grown segment; hulls are given by their vertices. Make one with `box`,
@@ -41,19 +39,19 @@ class Convex:
     def box(size: ArrayLike) -> Convex:
         """A box of full extents (3,), centred."""
         half = 0.5 * as_vector(size, "size", 3)
-        _positive("the size of a box", *half)
+        positive("the size of a box", *half)
         return Convex(BOX, half)
 
     @staticmethod
     def sphere(radius: float) -> Convex:
         """A sphere about the origin."""
-        _positive("the radius of a sphere", radius)
+        positive("the radius of a sphere", radius)
         return Convex(HULL, radius=float(radius), points=np.zeros((1, 3)))
 
     @staticmethod
     def capsule(radius: float, length: float) -> Convex:
         """A capsule along z, centred; *length* is that of the cylindrical part."""
-        _positive("the radius of a capsule", radius)
+        positive("the radius of a capsule", radius)
         if not (np.isfinite(length) and length >= 0.0):
             raise InputError(f"the length of a capsule is {length}; expected 0 or more, in m")
         return Convex(
@@ -63,20 +61,20 @@ class Convex:
     @staticmethod
     def cylinder(radius: float, length: float) -> Convex:
         """A cylinder along z, centred."""
-        _positive("radius and length of a cylinder", radius, length)
+        positive("radius and length of a cylinder", radius, length)
         return Convex(CYLINDER, np.array([radius, 0.5 * length, 0.0]))
 
     @staticmethod
     def cone(radius: float, length: float) -> Convex:
         """A cone along z with its tip at +length/2."""
-        _positive("radius and length of a cone", radius, length)
+        positive("radius and length of a cone", radius, length)
         return Convex(CONE, np.array([radius, 0.5 * length, 0.0]))
 
     @staticmethod
     def ellipsoid(radii: ArrayLike) -> Convex:
         """An ellipsoid of radii (3,) along its axes."""
         size = as_vector(radii, "radii", 3)
-        _positive("the radii of an ellipsoid", *size)
+        positive("the radii of an ellipsoid", *size)
         return Convex(ELLIPSOID, size)
 
     @staticmethod
@@ -93,10 +91,6 @@ class Convex:
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = turn, centre
         return Convex(HULL, radius=float(radius), points=np.ascontiguousarray(local[kept]), faces=faces, pose=pose)
-
-    def at(self, pose: ArrayLike) -> Convex:
-        """The same shape carried along by *pose* (4, 4): ``pose @ self.pose``."""
-        return replace(self, pose=as_pose(pose, "pose") @ self.pose)
 
     @functools.cached_property
     def half(self) -> Array:
@@ -130,11 +124,6 @@ class Convex:
             sets[j] |= {int(i), int(k)}
             sets[k] |= {int(i), int(j)}
         return [sorted(s) for s in sets]
-
-
-def _positive(what: str, *values: float) -> None:
-    if not all(np.isfinite(v) and v > 0.0 for v in values):
-        raise InputError(f"{what} must be positive, in m; got {', '.join(f'{v:g}' for v in values)}")
 
 
 def _box_frame(points: Array) -> tuple[Array, Array]:
@@ -213,24 +202,3 @@ def shape_convexes(shape: Shape) -> tuple[Convex, ...]:
     if shape.kind is ShapeKind.CYLINDER:
         return (Convex.cylinder(shape.size[0], shape.size[1]).at(shape.pose),)
     return (Convex.capsule(shape.size[0], shape.size[1]).at(shape.pose),)
-
-
-def pack(shapes: Sequence[Convex]) -> tuple[IntArray, Array, Array, IntArray]:
-    """Arrays for kernels (layout: `apprehend.kernels.gjk`): ints, floats, points, graph."""
-    ints = np.zeros((len(shapes), 4), np.int64)
-    floats = np.zeros((len(shapes), 23))
-    points: list[Array] = [np.zeros((0, 3))]
-    first, around = [0], []
-    count = 0
-    for g, shape in enumerate(shapes):
-        ints[g] = shape.kind, count, len(shape.points), -1
-        centre, reach = shape.ball
-        floats[g, :3], floats[g, 3], floats[g, 4:7], floats[g, 7] = shape.size, shape.radius, centre, reach
-        floats[g, 8:17], floats[g, 17:20], floats[g, 20:] = shape.pose[:3, :3].ravel(), shape.pose[:3, 3], shape.half
-        points.append(shape.points)
-        count += len(shape.points)
-        for near in shape.neighbours:
-            around += near
-            first.append(len(around))
-    graph = np.concatenate([np.array(first, np.int64) + len(first), np.array(around, np.int64)])
-    return ints, floats, np.concatenate(points), graph

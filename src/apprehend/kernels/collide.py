@@ -16,11 +16,23 @@ import numpy as np
 
 from ._jit import kernel
 from .collide_pairs import report
-from .gjk import AXIS, REL, ROWS, compose, gjk, relative
-from .gjk_depth import depth_scratch, signed_distance
+from .gjk import AXIS, HALF_SPACE, REL, ROWS, compose, gjk, relative
+from .gjk_depth import depth_scratch
+from .obstacle import any_distance, obstacle_gap, obstacle_stack
 
 CENTRE = 12  # columns of a placed shape: pose, centre of the bounding sphere, whether the pose is up to date
 DONE = 15
+
+
+class Shapes(NamedTuple):
+    """Shapes as arrays; rows beyond those that the caller counts are parts of unions and, last, a point."""
+
+    ints: np.ndarray  # (G, 4) int64
+    floats: np.ndarray  # (G, 23)
+    points: np.ndarray  # (V, 3)
+    graph: np.ndarray  # int64
+    trees: np.ndarray | None  # (T, 4)
+    grids: np.ndarray | None
 
 
 class CollideModel(NamedTuple):
@@ -28,10 +40,7 @@ class CollideModel(NamedTuple):
 
     links: np.ndarray  # (m, 3) int64: parent joint, kind (0 revolute, 1 prismatic), coordinate
     joints: np.ndarray  # (m, 14): place in the parent's moved frame (12), multiplier, offset
-    ints: np.ndarray  # (G, 4) int64
-    floats: np.ndarray  # (G, 23)
-    points: np.ndarray  # (V, 3)
-    graph: np.ndarray  # int64
+    shapes: Shapes  # see `gjk` and `obstacle`
     nodes: np.ndarray  # (K, 5 + m): bounding sphere in the carrier (4), carrier, farthest motion per unit of each joint
     blocks: np.ndarray  # (B, 4 + m) int64: node, node, first pair, end of pairs, whether a joint carries both
     pairs: np.ndarray  # (P, 2) int64: shapes
@@ -44,13 +53,15 @@ class CollideSpace(NamedTuple):
     shapes: np.ndarray  # (G, 16)
     balls: np.ndarray  # (K, 3), centres of the nodes' bounding spheres in the world
     memory: np.ndarray  # (P, 5): last separating direction of every pair, last vertices
-    ws: np.ndarray  # (16, 12), see `gjk`
+    ws: np.ndarray  # see `gjk`
+    big: np.ndarray  # see `gjk_depth`
+    stack: np.ndarray  # see `obstacle`
 
 
 @kernel
 def make_space(model):
     """Fresh scratch for *model*, with everything that stands still in place."""
-    ints, floats, nodes = model.ints, model.floats, model.nodes
+    ints, floats, nodes = model.shapes.ints, model.shapes.floats, model.nodes
     shapes, balls = np.zeros((ints.shape[0], 16)), np.zeros((nodes.shape[0], 3))
     for k in range(nodes.shape[0]):
         for i in range(3):
@@ -62,7 +73,8 @@ def make_space(model):
             shapes[g, CENTRE + i] = floats[g, 4 + i]
         shapes[g, DONE] = 1.0
     poses = np.zeros((model.links.shape[0], 12))
-    return CollideSpace(poses, shapes, balls, np.zeros((model.pairs.shape[0], 5)), np.zeros((ROWS, 12)))
+    memory, ws = np.zeros((model.pairs.shape[0], 5)), np.zeros((ROWS, 12))
+    return CollideSpace(poses, shapes, balls, memory, ws, depth_scratch(), obstacle_stack())
 
 
 @kernel
@@ -90,7 +102,7 @@ def move_joints(links, joints, q, poses):
 @kernel
 def place(model, q, space):
     """Put the tree at *q*: poses of joints, bounding spheres of nodes and shapes; poses of shapes follow on demand."""
-    ints, floats, nodes = model.ints, model.floats, model.nodes
+    ints, floats, nodes = model.shapes.ints, model.shapes.floats, model.nodes
     poses, shapes, balls = space.poses, space.shapes, space.balls
     move_joints(model.links, model.joints, q, poses)
     for k in range(nodes.shape[0]):
@@ -146,11 +158,12 @@ def node_gap(nodes, balls, a, b):
 
 
 @kernel
-def pair_gap(ints, floats, points, graph, a, b, poses, shapes, memory, ws, above, below, gap):
+def pair_gap(arrays, a, b, poses, shapes, memory, ws, big, stack, above, below, gap):
     """Bounds on the distance of shapes *a* and *b*: decided against *above* and *below*, or within a relative *gap*.
 
     The upper bound is meaningless when the lower one exceeds *above*. Overlapping cores count as touching.
     """
+    ints, floats, points, graph, trees, grids = arrays
     low = ball_to_ball(floats, shapes, a, b)
     if low > above:
         return low, low
@@ -159,6 +172,9 @@ def pair_gap(ints, floats, points, graph, a, b, poses, shapes, memory, ws, above
     if low > above:
         return low, low
     finish(ints, floats, poses, shapes, a)
+    if ints[b, 0] >= HALF_SPACE:
+        relative(shapes[a], shapes[b], ws[REL])
+        return obstacle_gap(ints, floats, points, graph, trees, grids, a, b, ws, big, above, below, gap, stack)
     low = ball_to_box(floats, shapes, b, a)
     if low > above:
         return low, low
@@ -175,11 +191,11 @@ def pair_gap(ints, floats, points, graph, a, b, poses, shapes, memory, ws, above
 @kernel
 def block_hit(model, space, block, margin):
     """The first pair of shapes of a block that is nearer than or at *margin*, or −1."""
-    ints, floats, points, graph, pairs = model.ints, model.floats, model.points, model.graph, model.pairs
-    poses, shapes, memory, ws = space.poses, space.shapes, space.memory, space.ws
+    pairs, arrays, poses, shapes = model.pairs, model.shapes, space.poses, space.shapes
+    memory, ws, big, stack = space.memory, space.ws, space.big, space.stack
     for p in range(model.blocks[block, 2], model.blocks[block, 3]):
         a, b = pairs[p, 0], pairs[p, 1]
-        lower, upper = pair_gap(ints, floats, points, graph, a, b, poses, shapes, memory[p], ws, margin, margin, 1e-12)
+        lower, upper = pair_gap(arrays, a, b, poses, shapes, memory[p], ws, big, stack, margin, margin, 1e-12)
         if not lower > margin and upper <= margin:
             return p
     return -1
@@ -228,8 +244,8 @@ def covered(model, space, rate, margin, resolution, wanted):
 
     A hit is answered as −1 − pair.
     """
-    ints, floats, points, graph, pairs = model.ints, model.floats, model.points, model.graph, model.pairs
-    poses, shapes, memory, ws = space.poses, space.shapes, space.memory, space.ws
+    pairs, arrays, poses, shapes = model.pairs, model.shapes, space.poses, space.shapes
+    memory, ws, big, stack = space.memory, space.ws, space.big, space.stack
     blocks, nodes, balls = model.blocks, model.nodes, space.balls
     radius = wanted
     for block in range(blocks.shape[0]):
@@ -239,7 +255,7 @@ def covered(model, space, rate, margin, resolution, wanted):
             continue
         for p in range(blocks[block, 2], blocks[block, 3]):
             a, b = pairs[p, 0], pairs[p, 1]
-            lower, upper = pair_gap(ints, floats, points, graph, a, b, poses, shapes, memory[p], ws, need, margin, 0.2)
+            lower, upper = pair_gap(arrays, a, b, poses, shapes, memory[p], ws, big, stack, need, margin, 0.2)
             if lower > need:
                 continue
             if upper <= margin:
@@ -251,23 +267,24 @@ def covered(model, space, rate, margin, resolution, wanted):
 
 
 @kernel
-def measure(model, p, space, big, out, best, within):
+def measure(model, p, space, out, best, within):
     """Signed distance of pair *p* and whether ``out (9,)`` was written: only when it is below *best* and *within*.
 
     ``out``: the witness points on both shapes and the unit normal from the second to the first, in the world.
     """
-    ints, floats, points, graph = model.ints, model.floats, model.points, model.graph
-    poses, shapes, ws = space.poses, space.shapes, space.ws
+    ints, floats, points, graph, trees, grids = model.shapes
+    poses, shapes, memory = space.poses, space.shapes, space.memory
+    ws, big, stack = space.ws, space.big, space.stack
     a, b = model.pairs[p, 0], model.pairs[p, 1]
     enough = max(min(best, within), 0.0)
-    lower, _ = pair_gap(ints, floats, points, graph, a, b, poses, shapes, space.memory[p], ws, enough, -1.0, 1e-3)
+    lower, _ = pair_gap(model.shapes, a, b, poses, shapes, memory[p], ws, big, stack, enough, -1.0, 1e-3)
     if lower > enough:
         return lower, False
     finish(ints, floats, poses, shapes, a)
     finish(ints, floats, poses, shapes, b)
     relative(shapes[a], shapes[b], ws[REL])
     ws[AXIS, 3], ws[AXIS, 4] = 0.0, 0.0
-    d = signed_distance(ints, floats, points, graph, a, b, ws, big)
+    d = any_distance(ints, floats, points, graph, trees, grids, a, b, ws, big, best, stack)
     if d >= best:
         return d, False
     report(shapes[a], ws, out)
@@ -281,7 +298,7 @@ def distances(model, q, within, start, stop, distance, pair, out, of_blocks):
     With ``of_blocks (B,)`` also the smallest of every block, for the last row; blocks farther apart than *within* get
     a lower bound above it.
     """
-    space, big = make_space(model), depth_scratch()
+    space = make_space(model)
     blocks, nodes, balls = model.blocks, model.nodes, space.balls
     each = of_blocks.shape[0] > 0
     for i in range(start, stop):
@@ -295,7 +312,7 @@ def distances(model, q, within, start, stop, distance, pair, out, of_blocks):
             if least == 1e300:
                 limit = 1e300 if each else best
                 for p in range(blocks[block, 2], blocks[block, 3]):
-                    d, written = measure(model, p, space, big, out[i], limit, within)
+                    d, written = measure(model, p, space, out[i], limit, within)
                     least = min(least, d)
                     if written:
                         limit = d
@@ -312,7 +329,7 @@ def gradients(model, q, pair, points, start, stop, out):
 
     ∂d/∂q = nᵀ (J_a(p_a) − J_b(p_b)) with the witness points fixed to their shapes and the normal n from b to a.
     """
-    links, joints, ints, pairs = model.links, model.joints, model.ints, model.pairs
+    links, joints, ints, pairs = model.links, model.joints, model.shapes.ints, model.pairs
     poses = np.zeros((links.shape[0], 12))
     for i in range(start, stop):
         move_joints(links, joints, q[i], poses)

@@ -16,8 +16,9 @@ model are rows of
                          hull, counted within the shape
 =========== ===========  ========================================================================================
 
-Everything happens in the frame of the first shape. The scratch ``ws`` (16, 12) holds the simplex in its first nine
-rows (w = a − b, a, b; the last four are the step before) and the rows named below.
+Everything happens in the frame of the first shape. The scratch ``ws`` (ROWS, 12) holds the simplex in its first nine
+rows (w = a − b, a, b; the last four are the step before) and the rows named below. The last four kinds are for
+`obstacle`: no core is their second shape.
 """
 
 from __future__ import annotations
@@ -31,6 +32,10 @@ BOX = 1
 CYLINDER = 2
 CONE = 3
 ELLIPSOID = 4
+HALF_SPACE = 5  # below z = 0 of its frame
+FIELD = 6  # ``ints[:, 1]``: its place in ``grids``, see `grid_search`
+CLOUD = 7  # ``ints[:, 1:3]``: first point, number of points; size[0:2]: first row in ``trees``, levels of the tree
+TREE = 8  # the same for shapes: first row, number of rows
 
 BARY = 9  # weights of the simplex' rows; 4:8 of the step before
 AXIS = 10  # 0:3 direction, 3 and 4 the last vertices found on a and on b
@@ -38,7 +43,10 @@ REL = 11  # pose of the second shape in the first
 NEAR = 12  # nearest points, 0:3 on the first and 3:6 on the second
 PLACE_A = 13  # poses in the world
 PLACE_B = 14
-ROWS = 16
+KEEP = 16  # pose of the second shape in the first, while ``ws[REL]`` holds that of a point
+BEST = 17  # the best witness so far
+SPARE = 18  # four rows for what is done with one pair
+ROWS = 22
 
 CLIMB_FROM = 24
 """Hulls with more vertices than this are climbed from neighbour to neighbour instead of searched."""

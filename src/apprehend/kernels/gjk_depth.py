@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from ._jit import kernel
-from .gjk import AXIS, NEAR, ROWS, difference, gjk, witnesses
+from .gjk import AXIS, BARY, NEAR, ROWS, difference, gjk, nearest_on_triangle, witnesses
 
 MAX_POINTS = 260
 MAX_FACES = 1024
@@ -159,7 +159,6 @@ def depth(ints, floats, points, graph, a, b, ws, n, big):
         size = max(size, abs(P[i, 0]) + abs(P[i, 1]) + abs(P[i, 2]))
     faces, count = 4, 4
     best, low = 1e300, 0.0
-    si, sj, sk = 0, 1, 2
     while True:
         near = 0
         for f in range(1, faces):
@@ -174,14 +173,13 @@ def depth(ints, floats, points, graph, a, b, ws, n, big):
         if h < best:
             best = max(h, 0.0)
             axis[0], axis[1], axis[2] = -x, -y, -z
-            si, sj, sk = int(F[near, CORNER]), int(F[near, CORNER + 1]), int(F[near, CORNER + 2])
         if h - F[near, 3] <= 1e-13 * size + 1e-10 * abs(h) or best - low <= 1e-10 * best + 1e-13 * size:
             break
         faces, sound = cut_away(P, F, faces, near, count, 1e-14 * size, inner)
         if not sound:
             break
         count += 1
-    deepest(P, si, sj, sk, best, ws)
+    deepest(P, F, faces, best, ws)
     return min(low, best), best
 
 
@@ -222,24 +220,25 @@ def cut_away(P, F, faces, near, new, slack, inner):
 
 
 @kernel(fast=False)
-def deepest(P, i, j, k, height, ws):
-    """Points of a and b whose difference is nearest to ``−height · axis`` on triangle i-j-k, into ``ws[NEAR]``."""
-    axis = ws[AXIS]
-    ux, uy, uz = P[j, 0] - P[i, 0], P[j, 1] - P[i, 1], P[j, 2] - P[i, 2]
-    vx, vy, vz = P[k, 0] - P[i, 0], P[k, 1] - P[i, 1], P[k, 2] - P[i, 2]
-    qx, qy, qz = -axis[0] * height - P[i, 0], -axis[1] * height - P[i, 1], -axis[2] * height - P[i, 2]
-    uu = ux * ux + uy * uy + uz * uz
-    uv = ux * vx + uy * vy + uz * vz
-    vv = vx * vx + vy * vy + vz * vz
-    qu = qx * ux + qy * uy + qz * uz
-    qv = qx * vx + qy * vy + qz * vz
-    det = uu * vv - uv * uv
-    s, t = 0.0, 0.0
-    if det > 1e-26 * uu * vv:
-        s = min(max((qu * vv - qv * uv) / det, 0.0), 1.0)
-        t = min(max((qv * uu - qu * uv) / det, 0.0), 1.0 - s)
-    for c in range(6):
-        ws[NEAR, c] = (1.0 - s - t) * P[i, 3 + c] + s * P[j, 3 + c] + t * P[k, 3 + c]
+def deepest(P, F, faces, height, ws):
+    """Points of a and b whose difference comes nearest to ``−height · axis`` on the polytope, into ``ws[NEAR]``."""
+    axis, bary = ws[AXIS], ws[BARY]
+    tx, ty, tz = -axis[0] * height, -axis[1] * height, -axis[2] * height
+    best = 1e300
+    for f in range(faces):
+        plane = F[f, 0] * tx + F[f, 1] * ty + F[f, 2] * tz - F[f, 3]
+        if plane * plane >= best:
+            continue
+        for k in range(3):
+            row = P[int(F[f, CORNER + k])]
+            ws[k, 0], ws[k, 1], ws[k, 2] = row[0] - tx, row[1] - ty, row[2] - tz
+            for c in range(3, 9):
+                ws[k, c] = row[c]
+        d = nearest_on_triangle(ws, 0, 1, 2, bary)
+        if d < best:
+            best = d
+            for c in range(6):
+                ws[NEAR, c] = bary[0] * ws[0, 3 + c] + bary[1] * ws[1, 3 + c] + bary[2] * ws[2, 3 + c]
 
 
 @kernel(fast=False)

@@ -1,32 +1,30 @@
-"""Spheres on lanes: sixteen configurations of a robot at once against itself and fixed boxes and cylinders.
+"""Spheres on lanes: sixteen configurations of a robot at once against itself and what stands around it.
 
 Every link is covered by spheres. Sixteen configurations lie side by side, so that the innermost loop is one vector
 instruction; they are independent ones, or the middles of sixteen pieces of one motion. In the latter case spheres
 grow by what they can move in half a piece: what is then free is free all along the piece.
 
-Fixed shapes are boxes or cylinders grown by a radius (a sphere is a grown point, a capsule a grown segment); for
+Fixed shapes are boxes or cylinders grown by a radius (a sphere is a grown point, a capsule a grown segment),
+half-spaces, and grids: a table of lower bounds on the distance to a cloud, a field or a union, one for each cell. For
 other shapes the box around them stands in. A model *decides* when its spheres and fixed shapes are the exact geometry;
 otherwise "free" is certain and the rest is left to the exact check.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ._jit import kernel
 from .lanes import LANES, sincos
+from .sphere_near import HALF_SPACE, at, near_fixed, near_grid, near_sphere
 
 PIECES = 2048
 """Largest number of pieces of a motion that wait to be checked."""
 
 BATCHES = 3
 """Batches of sixteen pieces after which a model that does not decide leaves the rest to the exact check."""
-
-BOX = 0
-CYLINDER = 1
 
 
 class SphereModel(NamedTuple):
@@ -38,9 +36,12 @@ class SphereModel(NamedTuple):
     nodes: np.ndarray  # (K, 5 + m): bounding sphere, (unused), farthest motion per unit of each joint
     parts: np.ndarray  # (K, 3) int64: carrier, first sphere, end
     selves: np.ndarray  # (B, 2 + m) int64: node, node, whether a joint carries both
-    fixed: np.ndarray  # (O, 17): pose (12), half extents or radius and half length (3), growing radius, kind
+    fixed: np.ndarray  # (O, 17): pose (12), half extents or radius and half length (3), growing radius, kind; a grid:
+    #  pose of its corner, cells per m, first cell, unused, the share by which bounds shrink with distance, kind
     meets: np.ndarray  # (C, 2) int64: node, fixed shape
     decides: np.ndarray  # (1,) int64
+    shapes: np.ndarray  # (O, 3) int64: cells of a grid along its axes
+    cells: np.ndarray  # float32: least distances of the points of each cell
 
 
 class SphereSpace(NamedTuple):
@@ -72,12 +73,6 @@ def sphere_space(model, n):
         np.empty((PIECES, 2)),
         np.empty((2, 2 * LANES)),
     )
-
-
-@kernel(inline=True)
-def at(index, width):
-    """First place of lane row ``width * index``; the sign is lost, so that the compiler sees it is not negative."""
-    return (index & 0xFFFFFFF) * width * LANES
 
 
 @kernel
@@ -165,74 +160,6 @@ def ready_node(parts, spheres, poses, centres, ready, k):
 
 
 @kernel
-def near_fixed(fixed, o, points, k, radius, rate, resolution, flags, mark):
-    """Whether sphere *k* of *points* with *radius* meets fixed shape *o*; returns whether any lane does.
-
-    With *mark* the lanes are noted: hard hits without growth, soft hits grown by what *rate* moves in half a piece
-    (nothing where that is less than *resolution*).
-    """
-    L = LANES
-    t = at(k, 3)
-    r0, r1, r2, r3, r4, r5 = fixed[o, 0], fixed[o, 1], fixed[o, 2], fixed[o, 3], fixed[o, 4], fixed[o, 5]
-    r6, r7, r8, x, y, z = fixed[o, 6], fixed[o, 7], fixed[o, 8], fixed[o, 9], fixed[o, 10], fixed[o, 11]
-    hx, hy, hz = fixed[o, 12], fixed[o, 13], fixed[o, 14]
-    grown = radius + fixed[o, 15]
-    box = fixed[o, 16] == 0.0
-    total = 0.0
-    for lane in range(L):
-        px = points[t + lane] - x
-        py = points[t + L + lane] - y
-        pz = points[t + 2 * L + lane] - z
-        u = r0 * px + r3 * py + r6 * pz
-        v = r1 * px + r4 * py + r7 * pz
-        w = r2 * px + r5 * py + r8 * pz
-        dz = max(abs(w) - hz, 0.0)
-        dx = max(abs(u) - hx, 0.0)
-        dy = max(abs(v) - hy, 0.0)
-        dr = max(math.sqrt(u * u + v * v) - hx, 0.0)
-        d = dz * dz + (dx * dx + dy * dy if box else dr * dr)
-        growth = rate * flags[2 * L + lane]
-        soft = grown + (growth if growth > resolution else 0.0)
-        s = 1.0 if d <= soft * soft else 0.0
-        flags[3 * L + lane] = d
-        total += s
-    if mark and total > 0.0:
-        for lane in range(L):
-            d = flags[3 * L + lane]
-            growth = rate * flags[2 * L + lane]
-            soft = grown + (growth if growth > resolution else 0.0)
-            flags[lane] = max(flags[lane], 1.0 if d <= grown * grown else 0.0)
-            flags[L + lane] = max(flags[L + lane], 1.0 if d <= soft * soft else 0.0)
-    return total > 0.0
-
-
-@kernel
-def near_sphere(a, i, b, j, radius, rate, resolution, flags, mark):
-    """As `near_fixed`, for sphere *i* of points *a* and sphere *j* of points *b* with the sum of their radii."""
-    L = LANES
-    s = at(i, 3)
-    t = at(j, 3)
-    total = 0.0
-    for lane in range(L):
-        x = a[s + lane] - b[t + lane]
-        y = a[s + L + lane] - b[t + L + lane]
-        z = a[s + 2 * L + lane] - b[t + 2 * L + lane]
-        d = x * x + y * y + z * z
-        growth = rate * flags[2 * L + lane]
-        soft = radius + (growth if growth > resolution else 0.0)
-        flags[3 * L + lane] = d
-        total += 1.0 if d <= soft * soft else 0.0
-    if mark and total > 0.0:
-        for lane in range(L):
-            d = flags[3 * L + lane]
-            growth = rate * flags[2 * L + lane]
-            soft = radius + (growth if growth > resolution else 0.0)
-            flags[lane] = max(flags[lane], 1.0 if d <= radius * radius else 0.0)
-            flags[L + lane] = max(flags[L + lane], 1.0 if d <= soft * soft else 0.0)
-    return total > 0.0
-
-
-@kernel
 def count_flags(flags, row):
     """Number of lanes with a flag."""
     total = 0.0
@@ -261,7 +188,14 @@ def hit_lanes(model, space, margin, resolution, enough):
     for c in range(meets.shape[0]):
         k, o = meets[c, 0], meets[c, 1]
         rate = rates[B + k]
-        if near_fixed(fixed, o, balls, k, nodes[k, 3] + margin, rate, resolution, flags, False):
+        if fixed[o, 16] >= HALF_SPACE:
+            if near_grid(model, o, balls, k, nodes[k, 3] + margin, rate, resolution, flags, False):
+                ready_node(parts, spheres, poses, centres, ready, k)
+                for s in range(parts[k, 1], parts[k, 2]):
+                    near_grid(model, o, centres, s, spheres[s, 3] + margin, rate, resolution, flags, True)
+                if count_flags(flags, 0) >= enough:
+                    return
+        elif near_fixed(fixed, o, balls, k, nodes[k, 3] + margin, rate, resolution, flags, False):
             ready_node(parts, spheres, poses, centres, ready, k)
             for s in range(parts[k, 1], parts[k, 2]):
                 near_fixed(fixed, o, centres, s, spheres[s, 3] + margin, rate, resolution, flags, True)
