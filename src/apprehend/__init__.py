@@ -17,6 +17,7 @@ _PUBLIC: dict[str, str] = {
     "Grasp": "apprehend.grasp",
     "Hand": "apprehend.kinematics",
     "Pose": "apprehend.spatial",
+    "ReachabilityMap": "apprehend.workspace",
     "Robot": "apprehend.kinematics",
     "Rotation": "apprehend.spatial",
     "Scene": "apprehend.collision",
@@ -27,7 +28,7 @@ _PUBLIC: dict[str, str] = {
 }
 _ROOMS = (
     "bodies", "collision", "conventions", "errors", "grasp", "ik", "kinematics", "parallel", "perception", "planning",
-    "process", "robots", "sim", "spatial", "trajectory", "viewer",
+    "process", "robots", "sim", "spatial", "trajectory", "viewer", "workspace",
 )  # fmt: skip
 
 __all__ = sorted((*_PUBLIC, *_ROOMS))
@@ -66,6 +67,7 @@ if TYPE_CHECKING:
         spatial,
         trajectory,
         viewer,
+        workspace,
     )
     from .bodies import Body
     from .collision import Scene
@@ -73,3 +75,4 @@ if TYPE_CHECKING:
     from .kinematics import Hand, Robot
     from .process import pick_and_place
     from .spatial import Pose, Rotation, Screw, Twist, Wrench
+    from .workspace import ReachabilityMap

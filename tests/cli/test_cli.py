@@ -147,3 +147,20 @@ def test_a_failed_pick_is_exit_code_one(tmp_path: Path) -> None:
     result = run("pick", "crate.obj", "--mass", "1", cwd=tmp_path)
     assert result.returncode == 1
     assert "failed" in result.stdout
+
+
+def test_a_reachability_map_is_built_kept_and_asked(tmp_path: Path) -> None:
+    out, picture = tmp_path / "ur5e.reach", tmp_path / "ur5e.png"
+    options = ("reach", "ur5e", "tool0", "--resolution", "0.1", "--angle", "60", "--out", str(out), "--json")
+    near = run(*options, "--xyz", "0.4,0.1,0.4", "--rpy", "180,0,0", "--deg")
+    assert near.returncode == 0, near.stderr
+    facts = json.loads(near.stdout)
+    assert facts["reachable"]
+    assert facts["agreement"] > 0.8
+    assert facts["coverage"] > 0.95
+    far = run(*options, "--xyz", "3,0,0", "--picture", str(picture))
+    assert far.returncode == 1
+    assert json.loads(far.stdout)["samples"] == facts["samples"]  # it went on from the file, and had nothing to add
+    wrong = run("reach", "ur5e", "tool")
+    assert wrong.returncode == 2
+    assert "Did you mean" in wrong.stderr

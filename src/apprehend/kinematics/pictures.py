@@ -45,7 +45,7 @@ def draw(
     center = line[-1, list(rows)]
     size = 0.5 * max(float(np.ptp(line, axis=0).max()), 1e-3)
     if axes is None:
-        axes = _new_axes(len(rows))
+        axes = new_axes(len(rows))
     axes.plot(*line[:, list(rows)].T, "-o", color="0.4", markersize=4)
     for kind in kinds:
         shape = _outline(robot, q, frame, kind, part)
@@ -61,7 +61,8 @@ def draw(
     return axes
 
 
-def _new_axes(dimensions: int) -> Any:
+def new_axes(dimensions: int) -> Any:
+    """Axes of a new figure, in two or three dimensions, without a window."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
