@@ -21,3 +21,8 @@ far = np.eye(4)
 far[0, 3] = 3.0
 print(ap.ik.solve(robot, far, "tool0").reason())
 assert not ap.ik.solve(robot, far, "tool0").success
+
+# what the pseudo-inverse, damping, clipping and smooth clipping make of the singular values of a Jacobian
+sigma = np.linalg.svd(robot.jacobian(every.solutions()[0], "tool0"), compute_uv=False)
+axes = ap.ik.plot_inverses(0.1, sigma=sigma)  # axes.figure.savefig("inverses.png")
+assert len(axes.lines) == 8

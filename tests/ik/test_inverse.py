@@ -78,3 +78,20 @@ def test_bad_arguments_are_named() -> None:
         ik.inverse_jacobian(np.ones(3))
     with pytest.raises(InputError, match="must not be negative"):
         ik.inverse_jacobian(np.eye(3), joint_weight=[1, 1, -1])
+
+
+def test_the_curves_are_drawn_with_their_jump_and_the_marks_of_a_jacobian() -> None:
+    pytest.importorskip("matplotlib")
+    sigma = np.linalg.svd(np.random.default_rng(3).normal(size=(6, 7)), compute_uv=False)
+    axes = ik.plot_inverses(0.2, sigma=sigma)
+    curves = {line.get_label(): line.get_xydata() for line in axes.lines if not line.get_label().startswith("_")}
+    assert len(curves) == 4
+    smooth = next(v for k, v in curves.items() if k.startswith("smooth"))
+    assert np.allclose(smooth[:, 1], ik.inverse_singular_values(smooth[:, 0], "smooth", 0.2))
+    marks = [line for line in axes.lines if line.get_marker() == "o"]
+    assert np.allclose(marks[0].get_ydata(), 1.0 / sigma)
+    assert ik.plot_inverses(axes=axes) is axes
+    with pytest.raises(InputError, match=r"sigma has shape \(1, 2\)"):
+        ik.plot_inverses(sigma=[[1.0, 2.0]])
+    with pytest.raises(InputError, match="has no inverse to draw"):
+        ik.plot_inverses(sigma=[0.0])

@@ -1,6 +1,7 @@
 """Inverse kinematics: solved, or why not (G 1.8)."""
 
 from .branches import BranchResult, BranchStatus, branches, redundancy_intervals, redundant_joint
+from .curves import plot_inverses
 from .inverse import inverse_jacobian, inverse_singular_values, null_space_projector, transpose_step
 from .result import IKResult, IKStatus
 from .several import solve_frames
@@ -43,6 +44,7 @@ __all__ = [
     "inverse_jacobian",
     "inverse_singular_values",
     "null_space_projector",
+    "plot_inverses",
     "redundancy_intervals",
     "redundant_joint",
     "solve",

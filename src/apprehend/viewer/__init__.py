@@ -5,6 +5,7 @@ from .draw import render
 from .live import Page
 from .pages import show_body, show_grasp, show_robot
 from .picture import Camera, Image, Item, jpeg, png
+from .postures import render_postures
 from .replay import show
 from .report import write_report
 from .stage import Stage
@@ -18,6 +19,7 @@ __all__ = [
     "jpeg",
     "png",
     "render",
+    "render_postures",
     "show",
     "show_body",
     "show_contacts",
