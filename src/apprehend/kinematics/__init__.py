@@ -13,6 +13,7 @@ from .differential import (
 from .exponentials import ProductOfExponentials, leaf_to_root_jacobian
 from .hand import Finger, Hand
 from .jaw import ParallelJaw
+from .link_models import LinkModels, link_models
 from .manipulability import Manipulability, manipulability
 from .pictures import draw
 from .polytopes import Polytope, force_polytope, velocity_polytope
@@ -24,6 +25,7 @@ __all__ = [
     "Finger",
     "Hand",
     "Limits",
+    "LinkModels",
     "Manipulability",
     "ParallelJaw",
     "Polytope",
@@ -40,6 +42,7 @@ __all__ = [
     "inverse_dh_transform",
     "joint_torques",
     "leaf_to_root_jacobian",
+    "link_models",
     "manipulability",
     "rpy_jacobian",
     "velocity",
