@@ -3,7 +3,7 @@
 The protocol is TRAC-IK's: poses of random configurations within the limits, no guess. Means include failures. Our
 solutions are checked by Pinocchio's forward kinematics where it is installed.
 
-    python -m benchmarks.ik_solve [NAME …] [--poses 10000]
+    python -m benchmarks.ik_solve [NAME …] [--poses 10000] [--tolerance 1e-6]
 """
 
 from __future__ import annotations
@@ -126,9 +126,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", default=list(CHAINS))
     parser.add_argument("--poses", type=int, default=10_000)
+    parser.add_argument("--tolerance", type=float, default=1e-6)
     options = parser.parse_args()
     for name in options.names:
-        report(arm(name), options.poses)
+        report(arm(name), options.poses, options.tolerance)
 
 
 if __name__ == "__main__":

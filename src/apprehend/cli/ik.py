@@ -112,7 +112,7 @@ def _closed_form(
 
 
 def _facts(model: Robot, frame: str, q: Array) -> list[tuple[str, float]]:
-    """For every joint vector: the nearest limit and how far it is in rad or m (negative: beyond), the manipulability."""
+    """For every joint vector: its nearest limit, how far off it is (rad, m; negative: beyond), the manipulability."""
     import numpy as np
 
     moving = list(model.chain(frame))
