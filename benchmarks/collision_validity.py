@@ -1,18 +1,21 @@
 """Validity of Panda configurations: spheres on lanes and convex pieces, beside coal through Pinocchio from Python.
 
 Self-collision and twenty obstacles. The exact model is the convex hulls of the links' collision meshes; coal checks the
-same hulls. One thread, and two.
+same hulls. Then a million configurations: is what the spheres call free free in the exact model, too? The same with a
+depth camera's cloud of points and a half-space as obstacles. One thread, and two.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from apprehend.collision import CollisionModel, Convex
+from apprehend.collision import Cloud, CollisionModel, Convex, HalfSpace
+from apprehend.kernels import sphere
 from apprehend.kinematics import Robot
 from apprehend.parallel import set_threads
 from benchmarks._harness import interleave, table
 
+MANY = 1_000_000
 COUNT = 20_000
 COUNT_COAL = 60
 
@@ -84,40 +87,68 @@ class Coal:
         )
 
 
+def spheres_alone(model: CollisionModel, q: np.ndarray) -> np.ndarray:
+    """What the spheres call free."""
+    blocked = np.zeros(len(q), np.int64)
+    sphere.check_lanes(model.lanes, q, model.clearance, 0, len(q), blocked)
+    return blocked == 0
+
+
+def false_free(model: CollisionModel, rng: np.random.Generator, count: int = MANY) -> tuple[int, int]:
+    """Among *count* random configurations: how many spheres call free, and how many of these the exact model hits."""
+    lower, upper = model.robot.limits.lower, model.robot.limits.upper
+    free = wrong = 0
+    for _ in range(-(-count // COUNT)):
+        q = rng.uniform(lower, upper, (COUNT, model.robot.n))
+        q = q[spheres_alone(model, q)]
+        free += len(q)
+        wrong += int((model.hits(q) >= 0).sum())
+    return free, wrong
+
+
+def cloud_of(model: CollisionModel, rng: np.random.Generator) -> Cloud:
+    """100,000 points on the boxes' surfaces, with 1 mm of noise: what depth cameras would see of them."""
+    points = []
+    for node in model.nodes:
+        if node.carrier < 0 and node.name.startswith("box"):
+            shape = node.shapes[0]
+            p = rng.uniform(-1.0, 1.0, (5000, 3))
+            axis = rng.integers(3, size=len(p))
+            p[np.arange(len(p)), axis] = np.sign(p[np.arange(len(p)), axis])
+            points.append((p * shape.size) @ shape.pose[:3, :3].T + shape.pose[:3, 3])
+    seen = np.concatenate(points)
+    return Cloud.of(seen + rng.normal(size=seen.shape) * 1e-3, 0.002)
+
+
 def main() -> None:
     rng = np.random.default_rng(0)
     robot = Robot.load("panda")
-    model = scene_of(robot, rng, CollisionModel(robot))
+    alone = CollisionModel(robot)
+    model = scene_of(robot, rng, alone)
+    floor = HalfSpace.through([0.0, 0.0, -0.01])
+    touching = [("floor", "panda_link0")]
+    cloudy = alone.add("cloud", cloud_of(model, rng)).add("floor", floor).allow(touching)
+    models = {"20 boxes": model, "100,000 points and a floor": cloudy}
     q = rng.uniform(robot.limits.lower, robot.limits.upper, (COUNT, robot.n))
-    from apprehend.kernels import sphere
-
-    blocked = np.zeros(COUNT, np.int64)
     peer = Coal(model)
     some = q[:COUNT_COAL]
     ours, theirs = model.hits(some) >= 0, np.array([peer.collides(x) for x in some])
-    free = model.free(q)
-    sphere.check_lanes(model.lanes, q, 0.0, 0, COUNT, blocked)
-    false_free = int(((blocked == 0) & ~free).sum())
-    print(
-        f"free: {free.mean():.2f}; same answer as coal: {(ours == theirs).mean():.4f}; "
-        f"free by spheres: {(blocked == 0).mean():.2f}"
-    )
-    print(f"false 'free' of the spheres among {COUNT}: {false_free}")
+    print(f"free: {model.free(q).mean():.2f}; same answer as coal: {(ours == theirs).mean():.4f}")
+    for name, each in models.items():
+        free, wrong = false_free(each, rng)
+        print(f"{name}: spheres call {free} of {MANY} free ({free / MANY:.2f}); {wrong} of these the exact model hits")
     for threads in (1, 2):
         set_threads(threads)
-        timings = interleave(
-            {
-                "spheres, then exact pieces": (lambda: model.free(q), COUNT),
-                "exact pieces": (lambda: model.hits(q[:4000]), 4000),
-                "coal through Pinocchio": (lambda: [peer.collides(x) for x in some], COUNT_COAL),
-                **(
-                    {"spheres alone": (lambda: sphere.check_lanes(model.lanes, q, 0.0, 0, COUNT, blocked), COUNT)}
-                    if threads == 1
-                    else {}
-                ),
-            },
-            rounds=5,
-        )
+        contenders = {
+            "spheres, then exact pieces": (lambda: model.free(q), COUNT),
+            "exact pieces": (lambda: model.hits(q[:4000]), 4000),
+            "coal through Pinocchio": (lambda: [peer.collides(x) for x in some], COUNT_COAL),
+            "spheres, then exact: points and floor": (lambda: cloudy.free(q), COUNT),
+        }
+        if threads == 1:
+            contenders["spheres alone"] = (lambda: spheres_alone(model, q), COUNT)
+            contenders["spheres alone: points and floor"] = (lambda: spheres_alone(cloudy, q), COUNT)
+        timings = interleave(contenders, rounds=5)
         table(f"one configuration, {threads} thread{'s' * (threads > 1)}", timings, "spheres, then exact pieces")
 
 
