@@ -94,6 +94,16 @@ def test_same_seed_same_answer_on_any_number_of_threads(jaw):
     np.testing.assert_array_equal(*answers)
 
 
+def test_contacts_lie_on_the_surface_of_coarse_round_bodies(jaw, tmp_path):
+    trimesh.creation.icosphere(subdivisions=2, radius=0.03).export(tmp_path / "ball.stl")
+    ball = ap.Body.load(tmp_path / "ball.stl", mass=0.2)
+    found = grasp.plan(jaw, ball, 20, rng=np.random.default_rng(0))
+    points = np.array([c.position for candidate in found for c in candidate.contacts])
+    distance = np.abs(trimesh.proximity.signed_distance(trimesh.Trimesh(ball.vertices, ball.faces), points))
+    assert distance.max() < 1e-7
+    assert all(ap.Grasp(candidate.contacts, body=ball).force_closure().success for candidate in found)
+
+
 def test_the_force_is_that_of_statics(jaw):
     """Two flat pads straight through the centre of mass: weight m g and acceleration a need m (g + a) / (2 µ) each."""
     body = ap.Body.box((0.04, 0.04, 0.04), mass=0.5, friction=0.5)

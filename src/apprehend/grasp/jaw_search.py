@@ -209,6 +209,8 @@ class Search:
         width = out[:, 0, 0] - out[:, 1, 0]
         points = np.einsum("nij,npj->npi", tcp[:, :3, :3], out[:, :, 1:4]) + tcp[:, None, :3, 3]
         normals = out[:, :, 4:7]
+        on_surface, off, _ = self.surface.nearest(points.reshape(-1, 3))
+        points, off = on_surface.reshape(-1, 2, 3), off.reshape(-1, 2).max(axis=1)
         line = points[:, 0] - points[:, 1]
         line /= np.maximum(np.linalg.norm(line, axis=1, keepdims=True), 1e-12)
         cosine = np.stack([-np.einsum("ij,ij->i", line, normals[:, 0]), np.einsum("ij,ij->i", line, normals[:, 1])], 1)
@@ -218,8 +220,7 @@ class Search:
         self.rejected["pads meet no surface"] = int((~fits).sum())
         self.rejected["slips: outside the friction cones"] = int((fits & ~firm).sum())
         i = np.nonzero(firm)[0]
-        off = self.surface.nearest(points[i].reshape(-1, 3))[1].reshape(-1, 2).max(axis=1)
-        whole = off <= 2.0 * self.s.compliance  # else the pad rests on two ridges, with nothing in between
+        whole = off[i] <= 2.0 * self.s.compliance  # else the pad rests on two ridges, with nothing in between
         self.rejected["pads bridge a hollow"] = int((~whole).sum())
         i = i[whole]
         tcp = tcp[i].copy()
