@@ -12,7 +12,7 @@ import numpy as np
 
 from ._jit import kernel
 from .timing import OK, duration, grid_parts, kinks, solve_into, subdivide
-from .timing_cubic import MASK, WIDE, WORK, cubic_rows, shifted
+from .timing_cubic import MASK, WIDE, WORK, cubic_rows, reach
 from .timing_rows import row_count
 
 ALONE = 12
@@ -121,37 +121,41 @@ def _meet_joint(rows, j, state):
 
 
 @kernel
-def _interval(i, grid, breaks, coefficients, first, begin, last, piece, c, n, z, step, local):
-    """Local coefficients of interval i of every lane's path; *piece* and *c* are kept from interval to interval.
+def _interval(i, grid, breaks, coefficients, first, begin, last, piece, c, n, place):
+    """Put interval i of every lane's path in *place* ``(5 WIDE)``: offset, length h, 1/2h, and the ends of its piece.
 
-    z and step ``(WIDE)``; ``grid (N + 1, WIDE)``; lane l holds path ``min(begin + l, last)``.
+    *piece* and the coefficients *c* are kept from interval to interval; ``grid (N + 1, WIDE)``; lane l holds path
+    ``min(begin + l, last)``.
     """
     moved = 0.0
     for lane in range(WIDE):
-        middle = 0.5 * (grid[i, lane] + grid[i + 1, lane])
-        z[lane] = grid[i, lane] - step[2 * WIDE + lane]
-        step[lane] = grid[i + 1, lane] - grid[i, lane]
-        moved += 1.0 if middle < step[2 * WIDE + lane] or middle >= step[3 * WIDE + lane] else 0.0
-    if moved > 0.0:
-        for lane in range(WIDE):
-            p = min(begin + lane, last)
-            at = first[p] + p
-            middle = 0.5 * (grid[i, lane] + grid[i + 1, lane])
-            if middle >= step[2 * WIDE + lane] and middle < step[3 * WIDE + lane]:
-                continue
-            k = max(piece[lane], 0)
-            while k > 0 and breaks[at + k] > middle:
-                k -= 1
-            while k < first[p + 1] - first[p] - 1 and breaks[at + k + 1] <= middle:
-                k += 1
-            piece[lane] = k
-            step[2 * WIDE + lane] = breaks[at + k]
-            step[3 * WIDE + lane] = breaks[at + k + 1]
-            z[lane] = grid[i, lane] - breaks[at + k]
-            for q in range(3):
-                for j in range(n):
-                    c[(q * n + j) * WIDE + lane] = coefficients[first[p] + k, q + 1, j]
-    shifted(c, z, n, local)
+        low = grid[i, lane]
+        h = grid[i + 1, lane] - low
+        place[lane] = low - place[3 * WIDE + lane]
+        place[WIDE + lane] = h
+        place[2 * WIDE + lane] = 0.5 / h
+        middle = low + 0.5 * h
+        moved += 1.0 if middle < place[3 * WIDE + lane] or middle >= place[4 * WIDE + lane] else 0.0
+    if moved == 0.0:
+        return
+    for lane in range(WIDE):
+        p = min(begin + lane, last)
+        at = first[p] + p
+        middle = grid[i, lane] + 0.5 * place[WIDE + lane]
+        if middle >= place[3 * WIDE + lane] and middle < place[4 * WIDE + lane]:
+            continue
+        k = max(piece[lane], 0)
+        while k > 0 and breaks[at + k] > middle:
+            k -= 1
+        while k < first[p + 1] - first[p] - 1 and breaks[at + k + 1] <= middle:
+            k += 1
+        piece[lane] = k
+        place[lane] = grid[i, lane] - breaks[at + k]
+        place[3 * WIDE + lane] = breaks[at + k]
+        place[4 * WIDE + lane] = breaks[at + k + 1]
+        for q in range(3):
+            for j in range(n):
+                c[(q * n + j) * WIDE + lane] = coefficients[first[p] + k, q + 1, j]
 
 
 @kernel
@@ -164,9 +168,8 @@ def _block(breaks, coefficients, first, grid, pinned, vlim, alim, x_start, x_end
     work = np.empty(WORK * WIDE)
     state = np.empty(PARTS * WIDE)
     c = np.empty(3 * n * WIDE)
-    local = np.empty(3 * n * WIDE)
-    z = np.empty(WIDE)
-    step = np.full(4 * WIDE, np.inf)
+    place = np.full(5 * WIDE, np.inf)
+    xy = np.empty(2 * WIDE)
     piece = np.full(WIDE, -1, dtype=np.int64)
     end = 3 * size * WIDE & MASK
     for lane in range(WIDE):
@@ -174,8 +177,8 @@ def _block(breaks, coefficients, first, grid, pinned, vlim, alim, x_start, x_end
         alpha[count, lane] = x_end
         good[lane] = 1.0
     for i in range(count - 1, -1, -1):
-        _interval(i, grid, breaks, coefficients, first, begin, last, piece, c, n, z, step, local)
-        cubic_rows(local, step, n, vlim, alim, work, size, rows)
+        _interval(i, grid, breaks, coefficients, first, begin, last, piece, c, n, place)
+        cubic_rows(c, place, n, vlim, alim, work, size, rows)
         rising = 0.0
         for lane in range(WIDE):
             state[LEAST + lane] = rows[end + lane]
@@ -201,18 +204,13 @@ def _block(breaks, coefficients, first, grid, pinned, vlim, alim, x_start, x_end
         good[lane] = 0.0 if outside else good[lane]
         x[0, lane] = min(x_start, beta[0, lane])
     for i in range(count):
-        _interval(i, grid, breaks, coefficients, first, begin, last, piece, c, n, z, step, local)
-        cubic_rows(local, step, n, vlim, alim, work, size, rows)
+        _interval(i, grid, breaks, coefficients, first, begin, last, piece, c, n, place)
         for lane in range(WIDE):
-            state[X + lane] = x[i, lane]
-            state[TOP + lane] = beta[i + 1, lane]
-        for r in range(size):
-            at = 3 * r * WIDE & MASK
-            for lane in range(WIDE):
-                value = rows[at + 2 * WIDE + lane] + rows[at + lane] * state[X + lane]
-                state[TOP + lane] = min(state[TOP + lane], value)
+            xy[lane] = x[i, lane]
+            xy[WIDE + lane] = beta[i + 1, lane]
+        reach(c, place, n, vlim, alim, work, xy)
         for lane in range(WIDE):
-            x[i + 1, lane] = max(state[TOP + lane], alpha[i + 1, lane])
+            x[i + 1, lane] = max(xy[WIDE + lane], alpha[i + 1, lane])
 
 
 @kernel

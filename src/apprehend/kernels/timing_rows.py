@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-from .timing_cubic import MASK, WIDE, WORK, cubic_rows, shifted
+from .timing_cubic import MASK, WIDE, WORK, cubic_rows
 from .timing_sampled import ROWS, VALUES, sampled_rows
 
 
@@ -254,6 +254,7 @@ def rows_along(breaks, coefficients, grid, vlim, alim, sampled, bounds, binomial
     local = np.zeros((degree + 1) * n * WIDE)
     c = np.empty(3 * n * WIDE)
     shift = np.empty(3 * WIDE)
+    place = np.empty(3 * WIDE)
     piece = np.empty(WIDE, dtype=np.int64)
     work = np.empty(max(work_size(degree), WORK) * WIDE)
     k = 0
@@ -272,8 +273,11 @@ def rows_along(breaks, coefficients, grid, vlim, alim, sampled, bounds, binomial
                     to = (p * n + j) * WIDE & MASK
                     for lane in range(WIDE):
                         c[to + lane] = coefficients[piece[lane], p + 1, j]
-            shifted(c, shift, n, local)
-            r = cubic_rows(local, shift[WIDE : 2 * WIDE], n, vlim, alim, work, size, out[block])
+            for lane in range(WIDE):
+                place[lane] = shift[lane]
+                place[WIDE + lane] = shift[WIDE + lane]
+                place[2 * WIDE + lane] = 0.5 * shift[2 * WIDE + lane]
+            r = cubic_rows(c, place, n, vlim, alim, work, size, out[block])
         else:
             load_block(coefficients, piece, shift, local)
             r = velocity_acceleration_rows(local, shift, degree, n, vlim, alim, binomial, work, size, out[block])
