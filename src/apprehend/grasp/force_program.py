@@ -2,302 +2,352 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..arrays import Array, as_array, as_vector
+from ..arrays import Array, IntArray, as_vector
 from ..errors import InputError
 from ..kernels import cone as kernel
-from .program import Solutions, solve
+from .limits import Limits, joint_torques, torque_bounds
+from .program import in_threes, layout, run
 
 if TYPE_CHECKING:
     from .grasp import Grasp
 
 
-@dataclass(frozen=True, eq=False)
-class Limits:
-    """What contact forces must respect besides the friction cones; None: no limit.
+RANK = 1e-11
+"""Singular values of the balance rows below this share of the largest count as zero."""
+TYPICAL = 1e-3
+"""Forces are counted in units of the wrench, but at least of this share of the smallest limit."""
 
-    *normal*: largest normal force, one number or one per contact; *total*: of their sum; *hand_jacobian* ``(m, n)``
-    with *torque_lower*, *torque_upper* ``(n,)`` (or one number, or ``(−x, x)`` from *torque_upper* alone) and
-    *torque_offset* ``(n,)``: ``lower ≤ J_Hᵗ f + offset ≤ upper`` (motor limits pass through a transmission by
-    multiplying *hand_jacobian* with it).
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What the cone programs of N grasps of one kind are made of: contacts of the same models in the same order.
+
+    ``G (N, p, m)`` scaled; ``maps (N, m, n)`` from cone coordinates to forces; the rest they share: the interior
+    element ``e (n,)``, ``links (L, n)``, the *cones*, the rows of normal forces, and how contacts share the rows.
     """
 
-    normal: ArrayLike | None = None
-    total: float | None = None
-    hand_jacobian: ArrayLike | None = None
-    torque_lower: ArrayLike | None = None
-    torque_upper: ArrayLike | None = None
-    torque_offset: ArrayLike | None = None
+    G: Array
+    maps: Array
+    e: Array
+    links: Array
+    cones: tuple[int, ...]
+    normals: IntArray
+    friction: Array  # (N, k)
+    torsion: Array  # (N, k)
+    scale: Array  # (p,)
+    grasp: Grasp  # one of them
+
+    @classmethod
+    def of(cls, grasp: Grasp) -> Parts:
+        """The parts of one grasp."""
+        from .closure import _stacked, normal_index
+
+        maps, e, links = _stacked(grasp)
+        normals = np.array([s.start + normal_index(c) for c, s in zip(grasp.contacts, grasp.slices, strict=True)])
+        friction, torsion = (np.array([[getattr(c, name) for c in grasp.contacts]]) for name in ("friction", "torsion"))
+        G = (grasp.matrix * grasp.scale[:, None])[None]
+        cones = tuple(size for cc in grasp.cones for size in cc.cones)
+        return cls(G, maps[None], e, links, cones, normals, friction, torsion, grasp.scale, grasp)
+
+    def __len__(self) -> int:
+        return len(self.G)
 
 
-NO_LIMITS = Limits()
+class _Builder:
+    """Columns (cones) and rows (equations) put together piece by piece, for N programs at once."""
+
+    def __init__(self, parts: Parts) -> None:
+        self.cones = list(parts.cones)
+        self.n = sum(parts.cones)
+        self.count = len(parts)
+        self.rows: list[Array] = []
+        self.right: list[Array] = []
+        self.kinds: list[int] = []
+        self.sizes: list[Array] = []  # what rows were divided by
+        self.names: dict[int, str] = {}  # row of a limit → name
+
+    def cone(self, size: int) -> int:
+        """A new cone; the column where it starts."""
+        padded = layout((size,))[1][0]
+        self.cones.append(padded)
+        self.n += padded
+        return self.n - padded
+
+    def equation(
+        self,
+        row: Array,
+        right: Array | float = 0.0,
+        kind: int = kernel.COUPLING,
+        others: dict[int, float] | None = None,
+    ) -> None:
+        """A new equation: *row* ``(N, …)`` over the first columns, *others* by column."""
+        full = np.zeros((self.count, self.n))
+        full[:, : row.shape[-1]] = row
+        for column, value in (others or {}).items():
+            full[:, column] = value
+        self.rows.append(full)
+        self.right.append(np.broadcast_to(np.asarray(right, np.float64), self.count))
+        self.kinds.append(kind)
+        self.sizes.append(np.ones(self.count))
+
+    def limit(self, row: Array, right: Array | float, name: str) -> None:
+        """``row x + s = right`` with a slack s ≥ 0, the row of unit length."""
+        length = np.linalg.norm(row, axis=-1)
+        length = np.where(length > 0.0, length, 1.0)
+        slack = self.cone(1)
+        self.names[len(self.rows)] = name
+        self.equation(row / length[:, None], right / length, slack, {slack: 1.0})
+        self.sizes[-1] = length
+
+    def arrays(self) -> tuple[Array, Array]:
+        """``A (N, rows, n)`` and ``b (N, rows)``."""
+        A = np.zeros((self.count, len(self.rows), self.n))
+        for i, row in enumerate(self.rows):
+            A[:, i, : row.shape[1]] = row
+        return A, np.array(self.right).T.reshape(self.count, len(self.rows))
 
 
-def with_torques(limits: Limits | None, torque_limits: ArrayLike, hand_jacobian: ArrayLike | None) -> Limits:
-    """*limits* with the joint torques bounded by *torque_limits* ``(n,)`` either way or ``(n, 2)`` pairs."""
-    limits = limits or NO_LIMITS
-    J = limits.hand_jacobian if hand_jacobian is None else hand_jacobian
-    if J is None:
-        raise InputError("torque_limits need hand_jacobian= the matrix J_H (m, n) that maps contact forces to torques")
-    bounds = as_array(torque_limits, "torque_limits", finite=False)
-    if bounds.ndim == 2 and bounds.shape[1] == 2:
-        return replace(limits, hand_jacobian=J, torque_lower=bounds[:, 0], torque_upper=bounds[:, 1])
-    if bounds.ndim > 1:
-        raise InputError(f"torque_limits has shape {bounds.shape}; expected (n,) or (n, 2)")
-    return replace(limits, hand_jacobian=J, torque_lower=-bounds, torque_upper=bounds)
-
-
-@dataclass
+@dataclass(frozen=True, eq=False)
 class Program:
-    """The cone program of a grasp, an objective and limits; only its right-hand side depends on the wrench.
+    """The cone programs of N grasps, an objective and limits; only their right-hand side depends on the wrench.
 
-    ``A x = b0 − B w``, forces ``f = maps x``.
+    ``A x = b0 − B w``, forces ``f = maps x``, value = *factor* × that of the program. *columns*, *right*, *kinds* and
+    *floor* are what `kernels.cone.solve` takes: the first rows, the balance of wrenches, are turned into orthonormal
+    ones by *onto*, so that neither units nor a weak direction of the grasp spoil the numbers. What of them is *missed*
+    cannot be balanced by any contact forces.
     """
 
     A: Array
     b0: Array
     B: Array
-    c: Array
-    Q: Array
-    cones: tuple[int, ...]
+    cones: IntArray
     maps: Array
-    sign: float
-    homogeneous: bool
-    names: dict[int, str] = field(default_factory=dict)  # column of a limit's slack → name
-    torque: tuple[Array, Array] | None = None  # J_H, offset
+    factor: Array
+    power: int
+    columns: Array
+    right: Array
+    kinds: IntArray
+    floor: float
+    onto: Array  # (N, rank, first rows)
+    missed: Array  # (first rows, first rows − rank); one grasp only
+    unit: float  # the first factor
+    names: dict[int, str]
+    sizes: Array  # (rows, N)
+    torque: tuple[Array, Array] | None  # J_H, offset
 
-    def __post_init__(self) -> None:
-        U, s, _ = np.linalg.svd(self.A)
-        rank = int((s > 1e-11 * max(float(s[0]), 1e-300)).sum())
-        self.onto, self.missed = (
-            U[:, :rank],
-            U[:, rank:],
-        )  # dependent rows make two answers possible: none, or fewer rows
+    @property
+    def n(self) -> int:
+        """Number of columns."""
+        return int(self.columns.shape[1])
 
+    @cached_property
+    def cuts(self) -> tuple[slice, slice, slice]:
+        """Where an answer holds x, y and z."""
+        n, rows = self.n, self.right.shape[1]
+        return slice(0, n), slice(n, n + rows), slice(n + rows, 2 * n + rows)
 
-class _Builder:
-    """Columns (cones) and rows (equations) put together piece by piece."""
-
-    def __init__(self) -> None:
-        self.cones: list[int] = []
-        self.n = 0
-        self.rows: list[tuple[dict[int, float] | Array, float]] = []
-
-    def cone(self, size: int) -> int:
-        """A new cone; the column where it starts."""
-        self.cones.append(size)
-        self.n += size
-        return self.n - size
-
-    def equation(self, row: dict[int, float] | Array, right: float) -> None:
-        """A new equation; *row* by column, or dense over the columns so far."""
-        self.rows.append((row, right))
-
-    def arrays(self) -> tuple[Array, Array]:
-        """A and b."""
-        A, b = np.zeros((len(self.rows), self.n)), np.zeros(len(self.rows))
-        for i, (row, right) in enumerate(self.rows):
-            b[i] = right
-            if isinstance(row, dict):
-                for j, v in row.items():
-                    A[i, j] = v
-            else:
-                A[i, : len(row)] = row
-        return A, b
+    def direction(self, y: Array, p: int) -> Array:
+        """The part ``(…, p)`` of dual solutions ``y (…, rows)`` that belongs to the wrench."""
+        rank = self.onto.shape[1]
+        onto = self.onto[0] if len(self.onto) == 1 else self.onto
+        d: Array = (y[..., None, :rank] @ onto)[..., 0, :p]
+        return d
 
 
-def build(grasp: Grasp, objective: str, limits: Limits, weights: Array | None = None) -> Program:
-    """The cone program for an objective and limits."""
-    from .closure import _stacked, normal_index
-
-    G = grasp.matrix * grasp.scale[:, None]
-    p, k, m = grasp.wrench_size, len(grasp), G.shape[1]
-    maps, e, links = _stacked(grasp)
-    builder = _Builder()
-    for cc in grasp.cones:
-        for size in cc.cones:
-            builder.cone(size)
-    margin, unit = -1, 1.0
+def build(parts: Parts, objective: str, limits: Limits, weights: Array | None = None) -> Program:
+    """The cone programs for an objective and limits."""
+    builder = _Builder(parts)
+    maps, links = parts.maps, np.broadcast_to(parts.links, (len(parts), *parts.links.shape))
+    unit, margin = np.ones(len(parts)), -1
     if objective == "max_margin":  # f = maps (x + t e'), with the smallest eigenvalue of P as t
         margin = builder.cone(1)
-        shift = e * _eigen_units(grasp)
-        unit = float(shift.max())  # t is counted in the finest of these, so that its column is of order one
-        shift = shift / unit
-        maps = np.column_stack([maps, maps @ shift])
-        links = np.column_stack([links, links @ shift])
-    for row in G @ maps:
-        builder.equation(row, 0.0)
-    for row in links:
-        builder.equation(row, 0.0)
-    normal_rows = []
-    for contact, s in zip(grasp.contacts, grasp.slices, strict=True):
-        normal_rows.append(maps[s.start + normal_index(contact)])
-    names: dict[int, str] = {}
-    homogeneous = True
-    if limits.normal is not None:
-        most = as_vector(limits.normal, "limits.normal", k)
-        for i in range(k):
-            if np.isfinite(most[i]):
-                _upper(builder, normal_rows[i], float(most[i]), names, f"normal force of contact {i}")
-                homogeneous = False
-    if limits.total is not None:
-        _upper(builder, np.sum(normal_rows, axis=0), float(limits.total), names, "sum of normal forces")
-        homogeneous = False
-    torque = joint_torques(grasp, limits)
-    if torque is not None:
-        J, offset = torque
-        lower, upper = torque_bounds(limits, J.shape[1])
-        for j in range(J.shape[1]):
-            row = J[:, j] @ maps
-            if np.isfinite(upper[j]):
-                _upper(builder, row, float(upper[j] - offset[j]), names, f"upper torque of joint {j}")
-            if np.isfinite(lower[j]):
-                _upper(builder, -row, float(offset[j] - lower[j]), names, f"lower torque of joint {j}")
-            homogeneous &= not (np.isfinite(upper[j]) or np.isfinite(lower[j]))
-    c, Q = {}, np.zeros(0)
-    w = np.ones(k) if weights is None else weights
-    if objective == "min_normal":
-        c = {j: float(v) for j, v in enumerate(w @ np.array(normal_rows))}
-    elif objective == "min_norm":
-        Q = _squares(grasp, maps)
-    elif objective == "min_largest":
-        t = builder.cone(1)
-        for row in normal_rows:
-            rest = builder.cone(1)
-            builder.equation({**_sparse(row), rest: 1.0, t: -1.0}, 0.0)
-        c = {t: 1.0}
-    elif objective == "min_largest_norm":
-        t = builder.cone(1)
-        for s in grasp.slices:
-            count = min(s.stop - s.start, grasp.dimension)  # the moment of a soft finger is not a force
-            u = builder.cone(1 + count)
-            builder.equation({u: 1.0, t: -1.0}, 0.0)
-            for j, component in enumerate(range(s.start, s.start + count)):
-                builder.equation({**_sparse(maps[component]), u + 1 + j: -1.0}, 0.0)
-        c = {t: 1.0}
-    elif objective == "max_margin":
-        c = {margin: -1.0}
-    elif objective == "min_torque":
-        if torque is None:
-            raise InputError('objective "min_torque" needs limits.hand_jacobian')
-        J, offset = torque
-        u = builder.cone(1 + J.shape[1])
-        for j in range(J.shape[1]):
-            builder.equation({**_sparse(J[:, j] @ maps), u + 1 + j: -1.0}, -float(offset[j]))
-            homogeneous &= bool(offset[j] == 0.0)
-        c = {u: 1.0}
+        shift = _eigen_units(parts)
+        unit = shift.max(axis=1)  # t is counted in the finest of these, so that its column is of order one
+        shift = (shift / unit[:, None])[..., None]
+        maps = np.concatenate([maps, maps @ shift], axis=2)
+        links = np.concatenate([links, links @ shift], axis=2)
+    for rows in (parts.G @ maps, links):
+        for i in range(rows.shape[1]):
+            builder.equation(rows[:, i], kind=kernel.BALANCE)
+    first = len(builder.rows)
+    torque = joint_torques(parts.grasp, limits)
+    _limits(builder, parts, maps, limits, torque)
+    c, Q, factor = _objective(builder, parts, maps, objective, torque, weights)
+    if objective == "max_margin":
+        c, factor = np.zeros(builder.n), -1.0 / unit
+        c[margin] = -1.0
     A, b0 = builder.arrays()
-    cost = np.zeros(builder.n)
-    for j, v in c.items():
-        cost[j] = v
-    full_Q = np.zeros(builder.n)
-    full_Q[: len(Q)] = Q
-    full_maps = np.zeros((m, builder.n))
-    full_maps[:, : maps.shape[1]] = maps
-    B = np.zeros((len(A), p))
-    B[:p] = np.diag(grasp.scale)
-    sign = -1.0 / unit if objective == "max_margin" else 1.0
-    return Program(A, b0, B, cost, full_Q, tuple(builder.cones), full_maps, sign, homogeneous, names, torque)
+    onto, missed = _orthonormal(A[:, :first])
+    rows_in = len(b0[0]) - first + onto.shape[1]
+    p = parts.G.shape[1]
+    columns = np.zeros((len(parts), builder.n, in_threes(rows_in) + 2))
+    columns[:, :, : onto.shape[1]] = (onto @ A[:, :first]).transpose(0, 2, 1)
+    columns[:, :, onto.shape[1] : rows_in] = A[:, first:].transpose(0, 2, 1)
+    columns[:, : len(c), -2] = c
+    columns[:, : Q.shape[1], -1] = Q
+    right = np.zeros((len(parts), in_threes(rows_in), 1 + p))
+    right[:, onto.shape[1] : rows_in, 0] = b0[:, first:]
+    right[:, : onto.shape[1], 1:] = -onto[:, :, :p] * parts.scale
+    kinds = np.full(in_threes(rows_in), kernel.COUPLING)
+    kinds[: onto.shape[1]] = kernel.BALANCE
+    kinds[onto.shape[1] : rows_in] = builder.kinds[first:]
+    full_maps = np.zeros((len(parts), parts.maps.shape[1], builder.n))
+    full_maps[:, :, : maps.shape[2]] = maps
+    B = np.zeros((A.shape[1], p))
+    B[:p] = np.diag(parts.scale)
+    return Program(
+        A, b0, B, np.array(builder.cones), full_maps, factor, 2 if Q.any() else 1, columns, right, kinds,
+        _floor(b0[:, first:], kinds[onto.shape[1] : rows_in], objective), onto, missed, float(factor[0]), builder.names,
+        np.array(builder.sizes), torque,
+    )  # fmt: skip
 
 
-def _sparse(row: Array) -> dict[int, float]:
-    return {int(j): float(row[j]) for j in np.nonzero(row)[0]}
+def _floor(right: Array, kinds: IntArray, objective: str) -> float:
+    """The least unit of force, from the constant sides of the rows behind the balance."""
+    limits = np.abs(right[:, kinds >= 0])
+    least = float(limits[limits > 0.0].min(initial=np.inf))
+    if not np.isfinite(least):
+        return TYPICAL * float(np.abs(right).max(initial=0.0))
+    return least if objective == "max_margin" else TYPICAL * least
 
 
-def _upper(builder: _Builder, row: Array, right: float, names: dict[int, str], name: str) -> None:
-    """``row x + s = right`` with a slack s ≥ 0, scaled to a unit right-hand side where that is not tiny."""
-    scale = max(abs(right), 1e-9)
-    s = builder.cone(1)
-    names[s] = name
-    builder.equation({**_sparse(row / scale), s: 1.0}, right / scale)
+def _limits(builder: _Builder, parts: Parts, maps: Array, limits: Limits, torque: tuple[Array, Array] | None) -> None:
+    """The rows of the limits on normal forces, their sum and joint torques."""
+    if limits.normal is not None:
+        most = as_vector(limits.normal, "limits.normal", len(parts.normals))
+        for i in np.flatnonzero(np.isfinite(most)):
+            builder.limit(maps[:, parts.normals[i]], float(most[i]), f"normal force of contact {i}")
+    if limits.total is not None and np.isfinite(limits.total):
+        builder.limit(maps[:, parts.normals].sum(axis=1), float(limits.total), "sum of normal forces")
+    if torque is None:
+        return
+    J, offset = torque
+    lower, upper = torque_bounds(limits, J.shape[1])
+    for j in range(J.shape[1]):
+        row = J[:, j] @ maps
+        if np.isfinite(upper[j]):
+            builder.limit(row, float(upper[j] - offset[j]), f"upper torque of joint {j}")
+        if np.isfinite(lower[j]):
+            builder.limit(-row, float(offset[j] - lower[j]), f"lower torque of joint {j}")
 
 
-def _eigen_units(grasp: Grasp) -> Array:
-    """By cone coordinate: the shift of x₀ that lowers the smallest eigenvalue of P by one."""
-    units = []
-    for contact, cc in zip(grasp.contacts, grasp.cones, strict=True):
-        mu, gamma = contact.friction, contact.torsion
-        for i, size in enumerate(cc.cones):
-            if contact.size == 1 or (size == 4):
-                unit = 1.0
-            elif i == 0:
-                unit = 1.0 / max(mu, 1e-12)
-            else:
-                unit = 1.0 / max(gamma, 1e-12)
-            units += [unit] + [0.0] * (size - 1)
-    return np.array(units)
+def _objective(
+    builder: _Builder, parts: Parts, maps: Array, objective: str, torque: tuple[Array, Array] | None,
+    weights: Array | None,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Cost ``c (n,)``, ``Q (N, n)`` and the *factor* of the value ``(N,)``, with the columns and rows they need."""
+    none, ones = np.zeros((len(parts), 0)), np.ones(len(parts))
+    normals = maps[:, parts.normals]
+    if objective == "min_normal":
+        w = np.ones(len(parts.normals)) if weights is None else weights
+        largest = max(float(np.abs(w).max()), 1e-300)
+        return (w / largest) @ normals[0], none, ones * largest
+    if objective == "min_norm":
+        return np.zeros(0), _squares(parts, maps), ones
+    if objective in ("min_largest", "min_largest_norm", "min_torque"):
+        if objective == "min_torque" and torque is None:
+            raise InputError('objective "min_torque" needs limits.hand_jacobian')
+        t = builder.cone(1 if torque is None or objective != "min_torque" else 1 + torque[0].shape[1])
+        if objective == "min_largest":
+            for i in range(normals.shape[1]):
+                rest = builder.cone(1)
+                builder.equation(normals[:, i], others={rest: 1.0, t: -1.0})
+        elif objective == "min_largest_norm":
+            for s in parts.grasp.slices:
+                count = min(s.stop - s.start, parts.grasp.dimension)  # the moment of a soft finger is not a force
+                u = builder.cone(1 + count)
+                builder.equation(none, others={u: 1.0, t: -1.0})
+                for j in range(count):
+                    builder.equation(maps[:, s.start + j], others={u + 1 + j: -1.0})
+        elif torque is not None:
+            J, offset = torque
+            length = max(float(np.linalg.norm(J)), 1e-300)
+            ones = ones * length
+            for j in range(J.shape[1]):
+                builder.equation((J[:, j] / length) @ maps, -float(offset[j]) / length, others={t + 1 + j: -1.0})
+        c = np.zeros(builder.n)
+        c[t] = 1.0
+        return c, none, ones
+    return np.zeros(0), none, ones  # "feasible", and "max_margin", which has its own column
 
 
-def _squares(grasp: Grasp, maps: Array) -> Array:
-    """Diagonal Q with ``½ xᵀ Q x = ‖f‖²`` on the cone program's feasible set."""
-    Q: Array = 2.0 * (maps**2).sum(axis=0)
+def _orthonormal(A: Array) -> tuple[Array, Array]:
+    """Maps T ``(N, rank, rows)`` for which ``T A`` has orthonormal rows, and what A ``(N, rows, n)`` misses."""
+    U, s, _ = np.linalg.svd(A, full_matrices=True)
+    rows = A.shape[1]
+    s = np.concatenate([s, np.zeros((len(s), rows - s.shape[1]))], axis=1)
+    rank = int((s[0] > RANK * max(float(s[0, 0]), 1e-300)).sum())
+    onto = (U[:, :, :rank] / s[:, None, :rank]).transpose(0, 2, 1)
+    return np.ascontiguousarray(onto), U[0, :, rank:].copy()
+
+
+def _eigen_units(parts: Parts) -> Array:
+    """By cone coordinate: the shift of x₀ that lowers the smallest eigenvalue of P by one ``(N, n)``."""
+    units = np.zeros((len(parts), len(parts.e)))
     column = 0
-    for contact, cc in zip(grasp.contacts, grasp.cones, strict=True):
+    for i, (contact, cc) in enumerate(zip(parts.grasp.contacts, parts.grasp.cones, strict=True)):
+        for j, size in enumerate(cc.cones):
+            if contact.size == 1 or size == 5:
+                units[:, column] = 1.0
+            else:
+                units[:, column] = 1.0 / np.maximum(parts.friction[:, i] if j == 0 else parts.torsion[:, i], 1e-12)
+            column += size
+    return units
+
+
+def _squares(parts: Parts, maps: Array) -> Array:
+    """Diagonals Q ``(N, n)`` with ``½ xᵀ Q x = ‖f‖²`` on the cone program's feasible set."""
+    Q: Array = 2.0 * (maps**2).sum(axis=1)
+    column = 0
+    for i, cc in enumerate(parts.grasp.cones):
         if len(cc.cones) == 3:  # τ = γ (u − v) / 2 with u + v = 2 f₃: τ² = γ² (u² + v²) / 2 − γ² f₃²
-            gamma = contact.torsion
-            if gamma > 1.0:
+            gamma = parts.torsion[:, i]
+            if gamma.max() > 1.0:
                 raise InputError(
-                    f"torsion γ is {gamma} m; the minimum norm with a box-shaped soft finger is convex up to 1 m"
+                    f"torsion γ is {gamma.max()} m; the minimum norm with a box-shaped soft finger is convex up to 1 m"
                 )
-            Q[column] -= 2.0 * gamma**2
-            Q[column + 3] = Q[column + 4] = gamma**2
+            Q[:, column] -= 2.0 * gamma**2
+            Q[:, column + 3] = Q[:, column + 4] = gamma**2
         column += sum(cc.cones)
     return Q
 
 
-def joint_torques(grasp: Grasp, limits: Limits) -> tuple[Array, Array] | None:
-    """J_H ``(m, n)`` and the offset ``(n,)`` of *limits*, checked; None without a hand Jacobian."""
-    if limits.hand_jacobian is None:
-        if limits.torque_lower is not None or limits.torque_upper is not None:
-            raise InputError("torque limits are given without limits.hand_jacobian (m, n)")
-        return None
-    J = as_array(limits.hand_jacobian, "limits.hand_jacobian")
-    m = grasp.matrix.shape[1]
-    if J.ndim != 2 or len(J) != m:
-        raise InputError(f"limits.hand_jacobian has shape {J.shape}; expected ({m}, n): one row per force component")
-    n = J.shape[1]
-    offset = np.zeros(n) if limits.torque_offset is None else as_vector(limits.torque_offset, "torque_offset", n)
-    return J, offset
+def answers(
+    program: Program, wrenches: Array, *, start: Array | None = None, share: float = 0.0, chain: bool = False
+) -> Array:
+    """Answers ``(N, …)`` of the program of one grasp, or of N programs, for ``wrenches (N, p)``."""
+    out = run(
+        program.columns, program.right, wrenches, program.cones, program.kinds, program.floor, len(wrenches),
+        start=start, share=share, chain=chain,
+    )  # fmt: skip
+    if program.missed.shape[1]:
+        refuse(program, wrenches, out)
+    return out
 
 
-def torque_bounds(limits: Limits, n: int) -> tuple[Array, Array]:
-    """Lower and upper limits of n joint torques, infinite where none is given."""
-    upper = np.full(n, np.inf) if limits.torque_upper is None else as_vector(limits.torque_upper, "torque_upper", n)
-    if limits.torque_lower is None:
-        lower = -upper if limits.torque_upper is not None else np.full(n, -np.inf)
-    else:
-        lower = as_vector(limits.torque_lower, "torque_lower", n)
-    bad = np.nonzero(lower > upper)[0]
-    if len(bad):
-        j = int(bad[0])
-        raise InputError(f"torque limits of joint {j} exclude each other: lower {lower[j]:g} > upper {upper[j]:g}")
-    return lower, upper
-
-
-def run(program: Program, wrenches: Array) -> tuple[Solutions, Array]:
-    """Solve for ``wrenches (N, p)``; homogeneous programs are scaled to unit wrenches first, by *size* ``(N,)``."""
-    right = -wrenches @ program.B.T
-    size = np.ones(len(wrenches))
-    if program.homogeneous:
-        size = np.sqrt((right * right).sum(axis=1))
-        size[size == 0.0] = 1.0
-        right /= size[:, None]
-    b = right + program.b0
-    if not program.missed.shape[1]:
-        return solve(program.A[None], b, program.c[None], program.cones, program.Q[None]), size
-    answer = solve(
-        (program.onto.T @ program.A)[None], b @ program.onto, program.c[None], program.cones, program.Q[None]
-    )
-    y = answer.y @ program.onto.T
+def refuse(program: Program, wrenches: Array, out: Array) -> None:
+    """Mark the wrenches that no forces balance, whatever the cones: the part that the balance rows miss proves it."""
+    first = len(program.missed)
+    b = program.b0[0, :first] - wrenches @ program.B[:first].T
     outside = b @ program.missed
-    squared = (outside * outside).sum(axis=1)
-    bad = squared > 1e-18 * (1.0 + (b * b).sum(axis=1))  # nothing in the range of A balances this: y with Aᵀ y = 0
-    y[bad] = outside[bad] @ program.missed.T / squared[bad, None]
-    codes = np.where(bad, kernel.INFEASIBLE, answer.status)
-    primal, dual = (np.where(bad, np.inf, v) for v in (answer.primal, answer.dual))
-    return Solutions(answer.x, y, answer.z, codes, primal, dual, answer.residual, answer.steps), size
+    bad = (outside * outside).sum(axis=1) > 1e-18 * (b * b).sum(axis=1)
+    m = 2 * program.n + program.right.shape[1]
+    out[bad, m : m + 3] = kernel.INFEASIBLE, np.inf, np.inf
+
+
+def missed_direction(program: Program, wrench: Array) -> Array | None:
+    """The certificate ``(p,)`` where a wrench is one that the balance rows miss."""
+    first, p = len(program.missed), len(wrench)
+    b = program.b0[0, :first] - program.B[:first] @ wrench
+    outside = b @ program.missed
+    square = float(outside @ outside)
+    if not square > 1e-18 * float(b @ b):
+        return None
+    d: Array = (program.missed @ outside)[:p] / square
+    return d

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,17 +13,21 @@ from ..arrays import Array, BoolArray, IntArray, as_array, as_shaped, as_vector,
 from ..errors import InputError
 from ..kernels import cone as kernel
 from ..result import Result, Status
-from .force_program import NO_LIMITS, Limits, Program, build, run
-from .program import Solutions
+from .force_program import Parts, Program, answers, build, missed_direction, refuse
+from .limits import NO_LIMITS, Limits
+from .program import MOST_STEPS
 
 if TYPE_CHECKING:
     from .grasp import Grasp
 
 OBJECTIVES = (
-    "min_normal", "min_norm", "min_largest", "min_largest_norm", "max_margin", "min_torque", "barrier",
+    "min_normal", "min_norm", "min_largest", "min_largest_norm", "max_margin", "min_torque", "barrier", "feasible",
 )  # fmt: skip
 ACTIVE = 1e-6
 """Relative slack below which a limit counts as reached."""
+WARM = 0.1
+"""How far an earlier answer is moved towards the middle of the cones before a method starts from it."""
+_FLOAT = np.dtype(np.float64)
 
 
 class ForceStatus(Status):
@@ -45,10 +49,8 @@ _CODES = {
 class ContactForces(Result):
     """Forces for one wrench.
 
-    *forces* ``(m,)``, contact by contact; *value* of the objective and *bound*, its certified lower bound (upper bound
-    of ``max_margin``); *residual*: largest violation of balance, relative. For INFEASIBLE the forces are zero, and
-    *certificate* ``(p,)`` is the proof: a direction d of scaled wrench space with ``d · (−w) > 0``, although no allowed
-    contact force pushes along it by more than the limits give.
+    *forces* ``(m,)``, contact by contact, zero unless they were found; *value* of the objective and *bound*, its
+    certified lower bound (upper bound of ``max_margin``); *residual*: largest violation of balance, relative.
     """
 
     status: ForceStatus
@@ -56,11 +58,12 @@ class ContactForces(Result):
     value: float
     bound: float
     residual: float
-    certificate: Array
     steps: int
     grasp: Grasp
-    reached: tuple[str, ...] = ()
-    torque: tuple[Array, Array] | None = None
+    wrench: Array
+    program: Program = field(repr=False)
+    answer: Array = field(repr=False)
+    """What the kernel found (`kernels.cone`), in units of its own: the start for a wrench nearby."""
 
     @property
     def gap(self) -> float:
@@ -73,6 +76,49 @@ class ContactForces(Result):
         pairs = zip(self.grasp.contacts, self.grasp.slices, strict=True)
         return np.array([float(c.slack(self.forces[s])) for c, s in pairs])
 
+    @cached_property
+    def certificate(self) -> Array:
+        """Where the status is INFEASIBLE, the proof ``(p,)``, else zeros.
+
+        It is a direction d of scaled wrench space with ``d · (−w) > 0``, although no allowed contact force pushes
+        along it by more than the limits give, which is Σ `multipliers` × limit.
+        """
+        p = self.grasp.wrench_size
+        if self.status is not ForceStatus.INFEASIBLE:
+            return np.zeros(p)
+        missed = missed_direction(self.program, self.wrench) if self.program.missed.shape[1] else None
+        if missed is not None:
+            return missed
+        return self.program.direction(self.answer[self.program.cuts[1]], p)
+
+    @cached_property
+    def multipliers(self) -> dict[str, float]:
+        """By limit, how fast the value falls as the limit grows; of the certificate's proof where it is infeasible."""
+        program = self.program
+        y, first = self.answer[program.cuts[1]], len(program.missed)
+        scale = 1.0
+        if self.status is ForceStatus.OPTIMAL:
+            scale = float(program.factor[0]) * float(self.answer[-1]) ** (program.power - 1)
+        shift = program.onto.shape[1] - first
+        return {name: -scale * float(y[r + shift] / program.sizes[r, 0]) for r, name in program.names.items()}
+
+    @cached_property
+    def gradient(self) -> Array:
+        """The derivative of the value by the wrench ``(p,)``; zeros unless the status is OPTIMAL."""
+        program, p = self.program, self.grasp.wrench_size
+        if self.status is not ForceStatus.OPTIMAL:
+            return np.zeros(p)
+        scale = float(program.factor[0]) * float(self.answer[-1]) ** (program.power - 1)
+        return -scale * self.grasp.scale * program.direction(self.answer[program.cuts[1]], p)
+
+    @property
+    def reached(self) -> tuple[str, ...]:
+        """Names of the limits that are reached."""
+        program = self.program
+        first = program.onto.shape[1] - len(program.missed)
+        x = self.answer
+        return tuple(name for r, name in program.names.items() if x[program.kinds[r + first]] < ACTIVE)
+
     @property
     def active(self) -> tuple[str, ...]:
         """Names of the limits and friction cones that are reached."""
@@ -84,7 +130,8 @@ class ContactForces(Result):
     @property
     def torques(self) -> Array:
         """Joint torques ``J_Hᵗ f + offset`` ``(n,)``; empty without a hand Jacobian in the limits."""
-        return np.zeros(0) if self.torque is None else self.torque[0].T @ self.forces + self.torque[1]
+        torque = self.program.torque
+        return np.zeros(0) if torque is None else torque[0].T @ self.forces + torque[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,13 +146,16 @@ class ForceBatch:
     codes: IntArray
     steps: Array
 
+    def __len__(self) -> int:
+        return len(self.codes)
+
     @property
     def success(self) -> BoolArray:
         """Which are optimal ``(N,)``."""
         ok: BoolArray = self.codes == kernel.OPTIMAL
         return ok
 
-    def status(self, i: int) -> ForceStatus:
+    def status(self, i: int | tuple[int, ...]) -> ForceStatus:
         """The outcome of wrench *i*."""
         return _CODES[int(self.codes[i])]
 
@@ -117,6 +167,8 @@ def contact_forces(
     limits: Limits | None = None,
     *,
     weights: ArrayLike | None = None,
+    start: ContactForces | None = None,
+    family: bool = False,
 ) -> ContactForces | ForceBatch:
     """Contact forces f in the friction cones with ``G f = −wrench``, best in the sense of *objective* (G 2.7).
 
@@ -124,51 +176,131 @@ def contact_forces(
     Objectives: ``min_normal`` Σ wᵢ fᵢⁿ (*weights* ``(k,)``); ``min_norm`` ‖f‖² (all components, moments in N m);
     ``min_largest`` max fᵢⁿ; ``min_largest_norm`` max ‖fᵢ‖ (without moments); ``max_margin`` the smallest eigenvalue
     of the LMI's P (µ f₃ − ‖f_t‖ for Coulomb contacts); ``min_torque`` ‖J_Hᵗ f + offset‖; ``barrier`` Σ wᵢ fᵢⁿ −
-    log det P(f), far from all walls (one wrench at a time).
+    log det P(f), far from all walls; ``feasible``: any.
+
+    Neighbouring wrenches have neighbouring answers: *start*, the answer for such a wrench with the same objective and
+    limits, or *family* for a batch in which each wrench is near the one before it, saves steps.
 
     The dual value is a certified bound; where nothing balances the wrench the answer is a certificate, never an
     exception. Raises `InputError` for limits without meaning.
     """
+    program = grasp.__dict__.get("_programs", {}).get(objective) if limits is None and weights is None else None
+    if program is None:
+        program = _program(grasp, objective, limits, weights)
+    if objective == "barrier":
+        from .barrier import analytic_centre
+
+        return analytic_centre(grasp, wrench, NO_LIMITS if limits is None else limits, weights, program)
+    p = grasp.wrench_size
+    if type(wrench) is np.ndarray and wrench.shape == (p,) and wrench.dtype is _FLOAT and wrench.flags.carray:
+        return _one(grasp, program, wrench, start)
+    w = as_shaped(wrench, "wrench", p)
+    if w.ndim == 1:
+        return _one(grasp, program, w, start)
+    begin, share, chain = None, 0.0, False
+    if start is not None:
+        begin, share = _earlier(program, start)[None], WARM
+    elif family:
+        share, chain = WARM, True
+    shape, w = w.shape[:-1], w.reshape(-1, p)
+    out = answers(program, w, start=begin, share=share, chain=chain)
+    return batch(program, w, out, shape)
+
+
+def _one(grasp: Grasp, program: Program, wrench: Array, start: ContactForces | None) -> ContactForces:
+    """The answer for one wrench, made with as little Python as may be: most of the time goes into this call."""
+    columns, right = program.columns, program.right
+    out = np.empty((1, 2 * columns.shape[1] + right.shape[1] + kernel.EXTRAS))
+    begin, share = (out, 0.0) if start is None else (_earlier(program, start)[None], WARM)
+    kernel.solve(
+        columns, right, wrench[None], program.cones, program.kinds, program.floor, begin, share, False, MOST_STEPS, out
+    )  # fmt: skip
+    if program.missed.shape[1]:
+        refuse(program, wrench[None], out)
+    answer = out[0]
+    code, primal, dual, error, other, steps, size = answer[-kernel.EXTRAS :].tolist()
+    status = _CODES.get(int(code))
+    if status is None:
+        as_shaped(wrench, "wrench", grasp.wrench_size)  # raises: an entry is not finite
+        raise InputError("wrench is too large to compute with")
+    scale = program.unit * size**program.power
+    forces = program.maps[0].dot(answer[: columns.shape[1]])
+    forces *= size if status is ForceStatus.OPTIMAL else 0.0
+    return single(
+        grasp, program, wrench, answer, status, forces, scale * primal, scale * dual, max(error, other), steps
+    )
+
+
+def single(
+    grasp: Grasp, program: Program, wrench: Array, answer: Array,
+    status: ForceStatus, forces: Array, value: float, bound: float, residual: float, steps: float,
+) -> ContactForces:  # fmt: skip
+    """A `ContactForces`, past the slow constructor of frozen dataclasses."""
+    made = object.__new__(ContactForces)
+    made.__dict__.update(
+        status=status, forces=forces, value=value, bound=bound, residual=residual, steps=int(steps), grasp=grasp,
+        wrench=wrench, program=program, answer=answer,
+    )  # fmt: skip
+    return made
+
+
+def _earlier(program: Program, start: ContactForces) -> Array:
+    if start.program.columns.shape != program.columns.shape or start.program.right.shape != program.right.shape:
+        raise InputError(
+            "start is the answer of another objective, other limits or another grasp; expected one of these"
+        )
+    return start.answer
+
+
+def batch(
+    program: Program, wrenches: Array, out: Array, shape: tuple[int, ...], done: tuple[Array, ...] | None = None
+) -> ForceBatch:
+    """The answers of the kernel as a `ForceBatch`; *done*: forces, values, bounds, residuals, steps found otherwise."""
+    p, cut, e = wrenches.shape[1], program.cuts, -kernel.EXTRAS
+    codes = out[:, e].astype(np.int64)
+    if done is None:
+        x, size = out[:, cut[0]], out[:, -1]
+        forces = x @ program.maps[0].T if len(program.maps) == 1 else (program.maps @ x[..., None])[..., 0]
+        forces *= np.where(codes == kernel.OPTIMAL, size, 0.0)[:, None]
+        scale = program.factor * size**program.power
+        residual = np.maximum(out[:, e + 3], out[:, e + 4])
+        done = (forces, scale * out[:, e + 1], scale * out[:, e + 2], residual, out[:, e + 5])
+    certificate = np.zeros((len(out), p))
+    bad = np.flatnonzero(codes == kernel.INFEASIBLE)
+    if len(bad):
+        onto = program.onto if len(program.onto) == 1 else program.onto[bad]
+        certificate[bad] = (out[bad, cut[1]][:, None, : onto.shape[1]] @ onto)[:, 0, :p]
+    if program.missed.shape[1]:
+        for i in bad:
+            missed = missed_direction(program, wrenches[i])
+            certificate[i] = certificate[i] if missed is None else missed
+    forces, value, bound, residual, steps = done
+
+    def shaped(v: Array) -> Array:
+        return v.reshape(shape + v.shape[1:])
+
+    return ForceBatch(
+        shaped(forces), shaped(value), shaped(bound), shaped(residual), shaped(certificate), codes.reshape(shape),
+        shaped(steps),
+    )  # fmt: skip
+
+
+def _program(grasp: Grasp, objective: str, limits: Limits | None, weights: ArrayLike | None) -> Program:
+    """The program of an objective and limits, made once per grasp."""
     choice(objective, "objective", OBJECTIVES)
     limits = NO_LIMITS if limits is None else limits
-    w = as_shaped(wrench, "wrench", grasp.wrench_size)
     weight = None if weights is None else as_vector(weights, "weights", len(grasp))
     for name, value in (("normal", limits.normal), ("total", limits.total)):
         if value is not None and float(np.min(as_array(value, f"limits.{name}", finite=False))) < 0.0:
             raise InputError(f"limits.{name} is {value}; a normal force cannot be limited below zero")
-    if objective == "barrier":
-        from .barrier import analytic_centre
-
-        if w.ndim != 1:
-            raise InputError('objective "barrier" takes one wrench (p,) at a time')
-        return analytic_centre(grasp, w, limits, np.ones(len(grasp)) if weight is None else weight)
-    key = objective if limits is NO_LIMITS and weight is None else None
-    cache: dict[str, Program] = grasp.__dict__.setdefault("_programs", {})
-    program = cache.get(key) if key else None
-    if program is None:
-        program = build(grasp, objective, limits, weight)
-        if key:
-            cache[key] = program
-    flat = w.reshape(-1, grasp.wrench_size)
-    answer, size = run(program, flat)
-    forces = answer.x @ program.maps.T * size[:, None]
-    power = 2 if program.Q.any() else 1
-    value, bound = (program.sign * v * size**power for v in (answer.primal, answer.dual))
-    good = answer.status == kernel.OPTIMAL
-    forces[~good] = 0.0
-    certificate = np.where((answer.status == kernel.INFEASIBLE)[:, None], answer.y[:, : grasp.wrench_size], 0.0)
-    if w.ndim > 1:
-        return ForceBatch(forces, value, bound, answer.residual, certificate, answer.status, answer.steps)
-    return _single(grasp, program, answer, forces[0], float(value[0]), float(bound[0]), certificate[0])
-
-
-def _single(
-    grasp: Grasp, program: Program, answer: Solutions, f: Array, value: float, bound: float, d: Array
-) -> ContactForces:
-    status = _CODES[int(answer.status[0])]
-    reached: tuple[str, ...] = ()
-    if program.names and status is ForceStatus.OPTIMAL:
-        reached = tuple(name for j, name in program.names.items() if answer.x[0, j] < ACTIVE)
-    return ContactForces(
-        status, f, value, bound, float(answer.residual[0]), d, int(answer.steps[0]), grasp, reached, program.torque
+    content: Any = tuple(
+        None if v is None else np.asarray(v, np.float64).tobytes() for v in (*vars(limits).values(), weight)
     )
+    plain = all(v is None for v in content)
+    key = objective if plain else (objective, content)
+    cache: dict[Any, Program] = grasp.__dict__.setdefault("_programs", {})
+    if key not in cache:
+        if len(cache) > 32:
+            cache.clear()
+        cache[key] = build(Parts.of(grasp), "max_margin" if objective == "barrier" else objective, limits, weight)
+    return cache[key]

@@ -16,8 +16,8 @@ from ..kernels.hull_support import BOX, SAME
 from .ball import Generators
 from .closure import Closure, force_closure, form_closure
 from .contact import Contact, ContactModel
-from .force_program import Limits, with_torques
 from .forces import ContactForces, ForceBatch, contact_forces
+from .limits import Limits, with_torques
 from .patch import Patch
 from .program import ContactCone, contact_cone
 from .push import Push, largest_force

@@ -9,13 +9,10 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..kernels import cone
+from ..kernels.wide import WIDTH
 from ..parallel import over_ranges
 from .contact import Contact, ContactModel
 
-TOLERANCE = 1e-9
-"""Relative residuals and duality gap at which a cone program counts as solved."""
-ACCEPTABLE = 1e-7
-"""What still counts as solved where rounding stops the method earlier."""
 MOST_STEPS = 50
 
 
@@ -40,35 +37,59 @@ def solve(A: Array, b: Array, c: Array, cones: tuple[int, ...], Q: Array | None 
     ``A (N, rows, n)``, ``b (N, rows)``, ``c, Q (N, n)``; axes of length 1 broadcast over the N problems.
     """
     count = max(len(A), len(b), len(c))
-    n, rows = A.shape[2], A.shape[1]
-    sizes, starts, offsets = _layout(cones)
-    Q = np.zeros((1, n)) if Q is None else Q
-    x, y, z = np.empty((count, n)), np.empty((count, rows)), np.empty((count, n))
-    status, m = np.empty(count, np.int64), np.empty((count, 5))
+    rows = A.shape[1]
+    places, padded = layout(cones)
+    each = max(len(A), len(c))
+    columns = np.zeros((each, sum(padded), in_threes(rows) + 2))
+    columns[:, places, :rows] = A.transpose(0, 2, 1)
+    columns[:, places, -2] = c
+    if Q is not None:
+        columns[:, places, -1] = Q
+    kinds = np.full(in_threes(rows), cone.COUPLING)
+    right = np.zeros((1, len(kinds), 1 + rows))
+    right[0, :rows, 1:] = np.eye(rows)
+    out = run(columns, right, np.ascontiguousarray(b), np.array(padded), kinds, 1.0, count)
+    x, y, z, last = np.split(out, np.cumsum([sum(padded), len(kinds), sum(padded)]), axis=1)
+    residual = np.maximum(last[:, 3], last[:, 4])
+    status = last[:, 0].astype(np.int64)
+    return Solutions(x[:, places], y[:, :rows], z[:, places], status, last[:, 1], last[:, 2], residual, last[:, 5])
+
+
+def run(
+    columns: Array, right: Array, wrenches: Array, cones: IntArray, kinds: IntArray, floor: float, count: int,
+    *, start: Array | None = None, share: float = 0.0, chain: bool = False,
+) -> Array:  # fmt: skip
+    """The answers ``(count, …)`` of `kernels.cone.solve`, on all threads."""
+    out = np.empty((count, 2 * columns.shape[1] + right.shape[1] + cone.EXTRAS))
+    begin = out[:1] if start is None else start
 
     def work(i: int, j: int) -> None:
-        each = [v if len(v) == 1 else v[i:j] for v in (A, b, c, Q)]
-        cone.solve(*each, sizes, starts, offsets, TOLERANCE, MOST_STEPS, x[i:j], y[i:j], z[i:j], status[i:j], m[i:j])
+        D, H, w, S = (v if len(v) == 1 else v[i:j] for v in (columns, right, wrenches, begin))
+        cone.solve(D, H, w, cones, kinds, floor, S, share, chain, MOST_STEPS, out[i:j])
 
-    over_ranges(work, count, 8)
-    if (status == cone.INACCURATE).any():
-        gap = np.abs(m[:, 0] - m[:, 1]) / np.maximum(1.0, np.abs(m[:, 0]))
-        fine = np.maximum(np.maximum(m[:, 2], m[:, 3]), gap) <= ACCEPTABLE
-        status = np.where((status == cone.INACCURATE) & fine, cone.OPTIMAL, status)
-    return Solutions(x, y, z, status, m[:, 0], m[:, 1], np.maximum(m[:, 2], m[:, 3]), m[:, 4])
+    over_ranges(work, count, 4 * WIDTH)
+    return out
+
+
+def in_threes(rows: int) -> int:
+    """The next multiple of three: how many rows the kernel wants."""
+    return -(-rows // 3) * 3
 
 
 @cache
-def _layout(cones: tuple[int, ...]) -> tuple[IntArray, IntArray, IntArray]:
-    """Sizes of the cones, where each starts in x, and where its block starts among the blocks."""
-    sizes = np.array(cones, np.int64)
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
-    return sizes, starts, np.concatenate([[0], np.cumsum(sizes**2)]).astype(np.int64)
+def layout(cones: tuple[int, ...]) -> tuple[IntArray, tuple[int, ...]]:
+    """Where the columns of *cones* stand once all sizes are odd, and those sizes."""
+    padded = tuple(k + (k + 1) % 2 for k in cones)
+    starts = np.cumsum((0, *padded))
+    return np.concatenate([s + np.arange(k) for s, k in zip(starts, cones)]), padded
 
 
 @dataclass(frozen=True, eq=False)
 class ContactCone:
-    """A contact's friction cone as a product of standard cones: ``f = map @ x``, x in *cones*, ``link @ x = 0``."""
+    """A contact's friction cone as a product of standard cones: ``f = map @ x``, x in *cones*, ``link @ x = 0``.
+
+    All sizes are odd (`kernels.cone_algebra`); the columns that fill up are zero.
+    """
 
     cones: tuple[int, ...]
     map: Array  # (m_i, k)
@@ -82,12 +103,12 @@ def contact_cone(contact: Contact) -> ContactCone:
     if contact.size == 1:
         return ContactCone((1,), np.eye(1), none.reshape(0, 1))
     if contact.dimension == 2:  # |f_t| ≤ µ f_n
-        return ContactCone((2,), np.array([[0.0, mu], [1.0, 0.0]]), none.reshape(0, 2))
+        return ContactCone((3,), np.array([[0.0, mu, 0.0], [1.0, 0.0, 0.0]]), none.reshape(0, 3))
     if contact.size == 3 or gamma == 0.0 or contact.model is ContactModel.SOFT:
-        k = 4 if contact.size == 4 and gamma > 0.0 else 3
+        k = 5 if contact.size == 4 and gamma > 0.0 else 3
         D = np.zeros((contact.size, k))
         D[2, 0], D[0, 1], D[1, 2] = 1.0, mu, mu
-        if k == 4:
+        if k == 5:
             D[3, 3] = gamma
         return ContactCone((k,), D, none.reshape(0, k))
     D = np.zeros((4, 5))  # x = (f₃, f₁/µ, f₂/µ) and (γ f₃ + τ)/γ, (γ f₃ − τ)/γ

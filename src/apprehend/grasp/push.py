@@ -12,8 +12,9 @@ from ..arrays import Array, as_array
 from ..errors import InputError
 from ..kernels import cone as kernel
 from ..result import Result
-from .force_program import Limits, build
+from .force_program import Parts, build
 from .forces import ForceStatus
+from .limits import Limits
 from .program import solve
 
 if TYPE_CHECKING:
@@ -62,20 +63,25 @@ def largest_force(
             raise InputError("direction has no force part; a cone of directions needs one")
         basis = np.linalg.svd(F[:d][None])[2][1:]
         columns += [np.concatenate([opening * size * e, np.zeros(p - d)]) for e in basis]
-    program = build(grasp, "min_norm", limits)
+    program = build(Parts.of(grasp), "feasible", limits)
     virtual = -np.array(columns).T * grasp.scale[:, None]
-    A = np.hstack([program.A, np.vstack([virtual, np.zeros((len(program.A) - p, len(columns)))])])
-    n = program.A.shape[1]
+    rows, n = program.A.shape[1:]
+    A = np.hstack([program.A[0], np.vstack([virtual, np.zeros((rows - p, len(columns)))])])
     c = np.zeros(A.shape[1])
     c[n] = -1.0
-    b = program.b0 - program.B @ F_e
-    answer = solve(A[None], b[None], c[None], (*program.cones, len(columns)))
+    b = program.b0[0] - program.B @ F_e
+    force, unit = float(np.abs(b).max()) or 1.0, float(np.linalg.norm(F * grasp.scale))  # what the numbers count in
+    A[:, n:] /= unit
+    answer = solve(A[None], b[None] / force, c[None], (*program.cones.tolist(), len(columns)))
     status = {
         kernel.OPTIMAL: ForceStatus.OPTIMAL, kernel.INFEASIBLE: ForceStatus.INFEASIBLE,
         kernel.UNBOUNDED: ForceStatus.UNBOUNDED,
     }.get(int(answer.status[0]), ForceStatus.INACCURATE)  # fmt: skip
     good = status is ForceStatus.OPTIMAL
-    x = answer.x[0] if good else np.zeros(A.shape[1])
-    value = float(-answer.primal[0]) if good else float("inf") if status is ForceStatus.UNBOUNDED else 0.0
-    bound = float(-answer.dual[0]) if good else value
-    return Push(status, value, bound, np.array(columns).T @ x[n:], program.maps @ x[:n])
+    x = answer.x[0] * force if good else np.zeros(A.shape[1])
+    x[n:] /= unit
+    value = (
+        float(-answer.primal[0]) * force / unit if good else float("inf") if status is ForceStatus.UNBOUNDED else 0.0
+    )
+    bound = float(-answer.dual[0]) * force / unit if good else value
+    return Push(status, value, bound, np.array(columns).T @ x[n:], program.maps[0] @ x[:n])

@@ -1,106 +1,181 @@
-"""Algebra of the cones of a cone program: half-lines and second-order cones, side by side in one vector.
+"""Algebra of the cones of a cone program, in wide numbers: half-lines and second-order cones, side by side in one vector.
 
-Cone i occupies ``starts[i] … starts[i] + cones[i]``. Here are Nesterov and Todd's scaling W of a primal-dual pair of
-points, products with it, the quotient of the cones' Jordan algebra, and the room that a step leaves.
+*cones* lists their sizes, all odd: the entries behind the first go in pairs, filled up with columns of zeros. Here are
+Nesterov and Todd's scaling W of a primal-dual pair of points, products with it, the quotient of the cones' Jordan
+algebra, and the room that a step leaves.
 """
 
 from __future__ import annotations
 
-import numpy as np
-
 from ._jit import kernel
+from .cone_rows import backward, factor, forward
+from .wide import larger, load, load2, root, store, store2, wide
 
 
 @kernel
-def scaling(x, z, cones, starts, w, beta, lam):  # type: ignore[no-untyped-def]
-    """Nesterov–Todd scaling of each cone: unit vector w and factor β with ``W z = W⁻¹ x = λ``. False if it fails."""
+def scaling(x, z, cones, w, beta, lam):  # type: ignore[no-untyped-def]
+    """Nesterov–Todd scaling of each cone: unit vector w and factor β with ``W z = W⁻¹ x = λ``; NaN outside the cone."""
+    s = 0
     for i in range(cones.shape[0]):
-        k, s = cones[i], starts[i]
-        if k == 1:
-            if not (x[s] > 0.0 and z[s] > 0.0):
-                return False
-            w[s], beta[i], lam[s] = 1.0, np.sqrt(x[s] / z[s]), np.sqrt(x[s] * z[s])
-            continue
-        xs, zs, xz = 0.0, 0.0, x[s] * z[s]
-        for j in range(s + 1, s + k):
-            xs += x[j] * x[j]
-            zs += z[j] * z[j]
-            xz += x[j] * z[j]
-        xs, zs = np.sqrt(xs), np.sqrt(zs)
-        if not (x[s] > xs and z[s] > zs):
-            return False
-        xn, zn = np.sqrt((x[s] - xs) * (x[s] + xs)), np.sqrt((z[s] - zs) * (z[s] + zs))
-        g = np.sqrt(0.5 * (1.0 + xz / (xn * zn)))
-        w[s] = 0.5 * (x[s] / xn + z[s] / zn) / g
-        beta[i] = np.sqrt(xn / zn)
-        dot = 0.0
-        for j in range(s + 1, s + k):
-            w[j] = 0.5 * (x[j] / xn - z[j] / zn) / g
-            dot += w[j] * z[j]
-        lam[s] = beta[i] * (w[s] * z[s] + dot)
-        t = dot / (1.0 + w[s]) + z[s]
-        for j in range(s + 1, s + k):
-            lam[j] = beta[i] * (z[j] + t * w[j])
-    return True
+        end = s + cones[i]
+        x0, z0 = load(x, s), load(z, s)
+        xs, zs, xz = wide(0.0), wide(0.0), x0 * z0
+        for j in range(s + 1, end, 2):
+            x1, x2, z1, z2 = load(x, j), load(x, j + 1), load(z, j), load(z, j + 1)
+            xs += x1 * x1 + x2 * x2
+            zs += z1 * z1 + z2 * z2
+            xz += x1 * z1 + x2 * z2
+        xs, zs = root(xs), root(zs)
+        xn, zn = root((x0 - xs) * (x0 + xs)), root((z0 - zs) * (z0 + zs))
+        ix, iz = 1.0 / xn, 1.0 / zn
+        b = root(xn * iz)
+        h = 0.5 / root(0.5 + 0.5 * xz * ix * iz)
+        ix, iz = ix * h, iz * h
+        w0, dot = x0 * ix + z0 * iz, wide(0.0)
+        for j in range(s + 1, end, 2):
+            z1, z2 = load(z, j), load(z, j + 1)
+            w1, w2 = load(x, j) * ix - z1 * iz, load(x, j + 1) * ix - z2 * iz
+            dot += w1 * z1 + w2 * z2
+            store(w, j, w1)
+            store(w, j + 1, w2)
+        store(w, s, w0)
+        store(beta, i, b)
+        store(lam, s, b * (w0 * z0 + dot))
+        t = dot / (1.0 + w0) + z0
+        for j in range(s + 1, end, 2):
+            store(lam, j, b * (load(z, j) + t * load(w, j)))
+            store(lam, j + 1, b * (load(z, j + 1) + t * load(w, j + 1)))
+        s = end
 
 
 @kernel
-def apply(v, cones, starts, w, beta, sign, out):  # type: ignore[no-untyped-def]
+def apply(v, cones, w, beta, sign, out):  # type: ignore[no-untyped-def]
     """``W v`` (sign +1) or ``W⁻¹ v`` (sign −1)."""
+    s = 0
     for i in range(cones.shape[0]):
-        k, s = cones[i], starts[i]
-        b = beta[i] if sign > 0.0 else 1.0 / beta[i]
-        dot = 0.0
-        for j in range(s + 1, s + k):
-            dot += w[j] * v[j]
-        t = dot / (1.0 + w[s]) + sign * v[s]
-        out[s] = b * (w[s] * v[s] + sign * dot)
-        for j in range(s + 1, s + k):
-            out[j] = b * (v[j] + t * w[j])
+        end = s + cones[i]
+        b, w0, v0, dot = load(beta, i), load(w, s), load(v, s), wide(0.0)
+        if sign < 0.0:
+            b = 1.0 / b
+        for j in range(s + 1, end, 2):
+            dot += load(w, j) * load(v, j) + load(w, j + 1) * load(v, j + 1)
+        t = dot / (1.0 + w0) + sign * v0
+        store(out, s, b * (w0 * v0 + sign * dot))
+        for j in range(s + 1, end, 2):
+            store(out, j, b * (load(v, j) + t * load(w, j)))
+            store(out, j + 1, b * (load(v, j + 1) + t * load(w, j + 1)))
+        s = end
 
 
 @kernel
-def second_order(lam, a, b, minus, cones, starts, out):  # type: ignore[no-untyped-def]
+def apply_rows(A, cones, w, beta, out):  # type: ignore[no-untyped-def]
+    """``W Aᵀ`` for a matrix by columns ``(n, rows, WIDTH)``: `apply` to each of its rows."""
+    s = 0
+    for i in range(cones.shape[0]):
+        end = s + cones[i]
+        b, w0 = load(beta, i), load(w, s)
+        share = 1.0 / (1.0 + w0)
+        for r in range(A.shape[1]):
+            v0, dot = load2(A, s, r), wide(0.0)
+            for j in range(s + 1, end, 2):
+                dot += load(w, j) * load2(A, j, r) + load(w, j + 1) * load2(A, j + 1, r)
+            t = dot * share + v0
+            store2(out, s, r, b * (w0 * v0 + dot))
+            for j in range(s + 1, end, 2):
+                store2(out, j, r, b * (load2(A, j, r) + t * load(w, j)))
+                store2(out, j + 1, r, b * (load2(A, j + 1, r) + t * load(w, j + 1)))
+        s = end
+
+
+@kernel
+def quotient(lam, a, b, minus, cones, out):  # type: ignore[no-untyped-def]
     """The u with ``λ ∘ u = a ∘ b − minus e`` in the Jordan algebra of each cone."""
+    s = 0
     for i in range(cones.shape[0]):
-        k, s = cones[i], starts[i]
-        if k == 1:
-            out[s] = (a[s] * b[s] - minus) / lam[s]
-            continue
-        d0, n2, dot = -minus, 0.0, 0.0
-        for j in range(s, s + k):
-            d0 += a[j] * b[j]
-        for j in range(s + 1, s + k):
-            out[j] = a[s] * b[j] + b[s] * a[j]
-            n2 += lam[j] * lam[j]
-            dot += lam[j] * out[j]
-        n = np.sqrt(n2)
-        u0 = (lam[s] * d0 - dot) / max((lam[s] - n) * (lam[s] + n), 1e-300)
-        out[s] = u0
-        for j in range(s + 1, s + k):
-            out[j] = (out[j] - u0 * lam[j]) / lam[s]
+        end = s + cones[i]
+        a0, b0, l0 = load(a, s), load(b, s), load(lam, s)
+        d0, square, dot = a0 * b0 - minus, wide(0.0), wide(0.0)
+        for j in range(s + 1, end, 2):
+            a1, a2, b1, b2, l1, l2 = load(a, j), load(a, j + 1), load(b, j), load(b, j + 1), load(lam, j), load(lam, j + 1)  # fmt: skip
+            d1, d2 = a0 * b1 + b0 * a1, a0 * b2 + b0 * a2
+            d0 += a1 * b1 + a2 * b2
+            square += l1 * l1 + l2 * l2
+            dot += l1 * d1 + l2 * d2
+            store(out, j, d1)
+            store(out, j + 1, d2)
+        norm = root(square)
+        u0 = (l0 * d0 - dot) / larger((l0 - norm) * (l0 + norm), 1e-300)
+        inverse = 1.0 / l0
+        store(out, s, u0)
+        for j in range(s + 1, end):
+            store(out, j, (load(out, j) - u0 * load(lam, j)) * inverse)
+        s = end
 
 
 @kernel
-def room(x, d, cones, starts):  # type: ignore[no-untyped-def]
-    """The inverse of the largest α with ``x + α d`` in the cone, at least 0."""
-    worst = 0.0
+def room(x, d, e, cones):  # type: ignore[no-untyped-def]
+    """The inverse of the largest α with ``x + α d`` and ``x + α e`` in the cones, at least 0."""
+    worst, s = wide(0.0), 0
     for i in range(cones.shape[0]):
-        k, s = cones[i], starts[i]
-        if k == 1:
-            worst = max(worst, -d[s] / x[s])
-            continue
-        n2, dot = 0.0, 0.0
-        for j in range(s + 1, s + k):
-            n2 += x[j] * x[j]
-            dot += x[j] * d[j]
-        n = np.sqrt(n2)
-        norm = np.sqrt(max((x[s] - n) * (x[s] + n), 1e-300))
-        r0 = (x[s] * d[s] - dot) / norm
-        t = (r0 + d[s]) / (x[s] + norm)
-        r1 = 0.0
-        for j in range(s + 1, s + k):
-            e = d[j] - t * x[j]
-            r1 += e * e
-        worst = max(worst, (np.sqrt(r1) - r0) / norm)
+        end = s + cones[i]
+        x0, d0, e0 = load(x, s), load(d, s), load(e, s)
+        square, xd, xe = wide(0.0), wide(0.0), wide(0.0)
+        for j in range(s + 1, end):
+            x1 = load(x, j)
+            square += x1 * x1
+            xd += x1 * load(d, j)
+            xe += x1 * load(e, j)
+        norm = root(square)
+        depth = root(larger((x0 - norm) * (x0 + norm), 1e-300))
+        inverse, share = 1.0 / depth, 1.0 / (x0 + depth)
+        d1, e1 = (x0 * d0 - xd) * inverse, (x0 * e0 - xe) * inverse
+        t, u = (d1 + d0) * share, (e1 + e0) * share
+        dd, ee = wide(0.0), wide(0.0)
+        for j in range(s + 1, end):
+            x1 = load(x, j)
+            v, q = load(d, j) - t * x1, load(e, j) - u * x1
+            dd += v * v
+            ee += q * q
+        worst = larger(worst, larger(root(dd) - d1, root(ee) - e1) * inverse)
+        s = end
     return worst
+
+
+@kernel
+def quadratic(Q, cones, w, beta, W, L, A):  # type: ignore[no-untyped-def]
+    """Factors ``L Lᵀ = 1 + W diag(Q) W`` of each cone's block, and ``L⁻¹`` applied to the columns' blocks of A."""
+    s = 0
+    for i in range(cones.shape[0]):
+        k = cones[i]
+        b, w0 = load(beta, i), load(w, s)
+        share = b / (1.0 + w0)
+        for p in range(k):  # W of this cone, with the roots of Q
+            for q in range(k):
+                v = load(w, s + p) * load(w, s + q) * share if p and q else b * load(w, s + p + q)
+                store2(W, p, q, v + b if p == q and p else v)
+        for p in range(k):
+            for q in range(p + 1):
+                t = wide(1.0 if p == q else 0.0)
+                for m in range(k):
+                    t += load2(W, p, m) * load2(W, m, q) * load(Q, s + m)
+                store2(L, s + p, q, t)
+        factor(L, s, k)
+        for r in range(A.shape[1]):
+            for p in range(k):
+                t = load2(A, s + p, r)
+                for m in range(p):
+                    t -= load2(L, s + p, m) * load2(A, s + m, r)
+                store2(A, s + p, r, t * load2(L, s + p, p))
+        s += k
+
+
+@kernel
+def triangular(L, cones, v, transposed):  # type: ignore[no-untyped-def]
+    """``L⁻¹ v``, or ``L⁻ᵀ v``, block by block, in place."""
+    s = 0
+    for i in range(cones.shape[0]):
+        if transposed:
+            backward(L, s, cones[i], v)
+        else:
+            forward(L, s, cones[i], v)
+        s += cones[i]

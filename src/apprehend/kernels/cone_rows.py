@@ -1,0 +1,111 @@
+"""The linear algebra of a cone program in wide numbers: products with the constraint matrix, and its normal equations.
+
+The matrix is kept by columns ``(n, rows, WIDTH)``. Rows go in threes, so that sums stay in registers: their number is a
+multiple of three, filled up with rows of zeros, which `factor` leaves out.
+"""
+
+from __future__ import annotations
+
+from ._jit import kernel
+from .wide import load, load2, root, store, store2, where, wide
+
+
+@kernel
+def spread(A, y, out):  # type: ignore[no-untyped-def]
+    """``out = Aᵀ y``, one entry for each column."""
+    n, rows = A.shape[0], A.shape[1]
+    for r in range(0, rows, 3):
+        y0, y1, y2 = load(y, r), load(y, r + 1), load(y, r + 2)
+        for j in range(n):
+            before = wide(0.0) if r == 0 else load(out, j)
+            store(out, j, before + load2(A, j, r) * y0 + load2(A, j, r + 1) * y1 + load2(A, j, r + 2) * y2)
+
+
+@kernel
+def gather(A, x, out):  # type: ignore[no-untyped-def]
+    """``out = A x``, one entry for each row."""
+    n, rows = A.shape[0], A.shape[1]
+    for r in range(0, rows, 3):
+        t0, t1, t2 = wide(0.0), wide(0.0), wide(0.0)
+        for j in range(n):
+            v = load(x, j)
+            t0 += load2(A, j, r) * v
+            t1 += load2(A, j, r + 1) * v
+            t2 += load2(A, j, r + 2) * v
+        store(out, r, t0)
+        store(out, r + 1, t1)
+        store(out, r + 2, t2)
+
+
+@kernel
+def gram(A, S):  # type: ignore[no-untyped-def]
+    """``S = A Aᵀ``, its lower part."""
+    n, rows = A.shape[0], A.shape[1]
+    for r in range(0, rows, 3):
+        for q in range(0, r + 1, 3):
+            s00, s01, s02 = wide(0.0), wide(0.0), wide(0.0)
+            s10, s11, s12 = wide(0.0), wide(0.0), wide(0.0)
+            s20, s21, s22 = wide(0.0), wide(0.0), wide(0.0)
+            for j in range(n):
+                a0, a1, a2 = load2(A, j, r), load2(A, j, r + 1), load2(A, j, r + 2)
+                b0, b1, b2 = load2(A, j, q), load2(A, j, q + 1), load2(A, j, q + 2)
+                s00 += a0 * b0
+                s01 += a0 * b1
+                s02 += a0 * b2
+                s10 += a1 * b0
+                s11 += a1 * b1
+                s12 += a1 * b2
+                s20 += a2 * b0
+                s21 += a2 * b1
+                s22 += a2 * b2
+            store2(S, r, q, s00)
+            store2(S, r, q + 1, s01)
+            store2(S, r, q + 2, s02)
+            store2(S, r + 1, q, s10)
+            store2(S, r + 1, q + 1, s11)
+            store2(S, r + 1, q + 2, s12)
+            store2(S, r + 2, q, s20)
+            store2(S, r + 2, q + 1, s21)
+            store2(S, r + 2, q + 2, s22)
+
+
+@kernel
+def factor(S, at, n):  # type: ignore[no-untyped-def]
+    """Cholesky factor in place of the n rows from *at* on (lower part); the diagonal holds reciprocals.
+
+    A pivot lost to rounding is left out.
+    """
+    for j in range(n):
+        before = load2(S, at + j, j)
+        t = before
+        for m in range(j):
+            a = load2(S, at + j, m)
+            t -= a * a
+        inverse = where(t > 1e-15 * before, 1.0 / root(t), 0.0)
+        store2(S, at + j, j, inverse)
+        for i in range(j + 1, n):
+            t = load2(S, at + i, j)
+            for m in range(j):
+                t -= load2(S, at + i, m) * load2(S, at + j, m)
+            store2(S, at + i, j, t * inverse)
+
+
+@kernel
+def forward(S, at, n, v):  # type: ignore[no-untyped-def]
+    """``L⁻¹ v`` in place, for the n entries from *at* on."""
+    for j in range(n):
+        t = load(v, at + j)
+        for m in range(j):
+            t -= load2(S, at + j, m) * load(v, at + m)
+        store(v, at + j, t * load2(S, at + j, j))
+
+
+@kernel
+def backward(S, at, n, v):  # type: ignore[no-untyped-def]
+    """``L⁻ᵀ v`` in place, for the n entries from *at* on."""
+    for back in range(n):
+        j = n - 1 - back
+        t = load(v, at + j)
+        for m in range(j + 1, n):
+            t -= load2(S, at + m, j) * load(v, at + m)
+        store(v, at + j, t * load2(S, at + j, j))
