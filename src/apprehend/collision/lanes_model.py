@@ -37,27 +37,32 @@ def sphere_model(exact: CollideModel, nodes: Sequence[Node], clearance: float) -
     based = [k for k, node in enumerate(nodes) if node.carrier < 0]
     small = FINEST * max((float(exact.nodes[k, 5:].max(initial=0.0)) for k in moving), default=1.0)
     table_of = _Fixed()
-    standing = {k: [o for shape in nodes[k].shapes for o in table_of.add(shape)] for k in based}
+    standing = {k: [(o, g) for g, shape in enumerate(nodes[k].shapes) for o in table_of.add(shape)] for k in based}
     number = {k: i for i, k in enumerate(moving)}
     spheres: list[Array] = []
+    round_only: list[bool] = []
     parts, count = [], 0
     for k in moving:
         balls = np.concatenate([cover(shape, small=small) for shape in nodes[k].shapes if isinstance(shape, Convex)])
-        if any(shape.kind != HULL or len(shape.points) != 1 for shape in nodes[k].shapes):
-            table_of.decides = False
+        round_only.append(all(shape.kind == HULL and len(shape.points) == 1 for shape in nodes[k].shapes))
         spheres.append(balls)
         parts.append((nodes[k].carrier, count, count + len(balls)))
         count += len(balls)
     table = np.array([_row(exact.nodes[k], balls) for k, balls in zip(moving, spheres, strict=True)])
-    selves, meets = [], []
+    selves, ranges, meets, exactly, exactly_selves = [], [], [], [], []
     for row in exact.blocks:
-        a, b = int(row[0]), int(row[1])
+        a, b, first = int(row[0]), int(row[1]), int(row[2])
         if nodes[b].carrier >= 0:
             selves.append([number[a], number[b], *row[4:]])
+            ranges.append(row[2:4])
+            exactly_selves.append(round_only[number[a]] and round_only[number[b]])
         else:
             centre, radius = reachable(exact, int(nodes[a].carrier), table[number[a]])
-            near = [o for o in standing[b] if gap(table_of.shapes[o], centre) <= radius + clearance]
-            meets += [(number[a], o) for o in near]
+            for o, g in standing[b]:
+                if gap(table_of.shapes[o], centre) <= radius + clearance:
+                    meets.append((number[a], o, first + g, len(nodes[b].shapes)))
+                    exactly.append(round_only[number[a]] and table_of.exactly[o])
+    ends = np.cumsum([0, *(len(node.shapes) for node in nodes)])
     return SphereModel(
         links=exact.links,
         joints=exact.joints,
@@ -66,8 +71,11 @@ def sphere_model(exact: CollideModel, nodes: Sequence[Node], clearance: float) -
         parts=np.array(parts, np.int64).reshape(-1, 3),
         selves=np.array(selves, np.int64).reshape(-1, 2 + m),
         fixed=np.array(table_of.rows, np.float64).reshape(-1, 17),
-        meets=np.array(meets, np.int64).reshape(-1, 2),
-        decides=np.array([table_of.decides], np.int64),
+        meets=np.array(meets, np.int64).reshape(-1, 4),
+        owns=np.array([(ends[k], ends[k + 1]) for k in moving], np.int64).reshape(-1, 2),
+        ranges=np.array(ranges, np.int64).reshape(-1, 2),
+        exactly=np.array(exactly + exactly_selves, np.int64),
+        decides=np.array([all(round_only) and all(table_of.exactly)], np.int64),
         shapes=np.array(table_of.counts, np.int64).reshape(-1, 3),
         cells=np.concatenate([np.zeros(0, np.float32), *table_of.cells]),
     )
@@ -82,7 +90,7 @@ class _Fixed:
         self.counts: list[tuple[int, ...]] = []
         self.cells: list[Array] = []
         self.total = 0
-        self.decides = True
+        self.exactly: list[bool] = []
 
     def add(self, shape: Geometry) -> list[int]:
         """The numbers of the rows that stand for *shape*."""
@@ -96,12 +104,12 @@ class _Fixed:
             self.rows.append([*shape.pose[:3, :3].ravel(), *place, 1.0 / side, self.total, 0.0, 0.0, sphere_near.GRID])
             self.cells.append(bounds.ravel())
             self.total += bounds.size
-            self.decides = False
+            self.exactly.append(False)
             counts = bounds.shape
         else:
             row, exactly = fixed_row(shape)
             self.rows.append(row)
-            self.decides &= exactly
+            self.exactly.append(exactly)
         self.counts.append(counts)
         return [len(self.rows) - 1]
 

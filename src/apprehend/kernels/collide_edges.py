@@ -1,33 +1,14 @@
-"""Straight motions in joint space: spheres on lanes first, exact convex pieces for what they leave open."""
+"""Many straight motions in joint space: which are free, and what the others hit."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 
 from ._jit import kernel
-from .collide import CollideSpace, block_rates, covered, make_space, place
-from .sphere import SphereSpace, edge_lanes, sphere_space
+from .collide import block_rates, covered, make_space, place
+from .lane_edges import edge_blocked, edge_space
 
 QUEUE = 4096
-
-
-class EdgeSpace(NamedTuple):
-    """Scratch of one thread."""
-
-    exact: CollideSpace
-    lanes: SphereSpace
-    rate: np.ndarray  # (B,)
-    queue: np.ndarray  # (QUEUE + 1, n): begin and end of open pieces; the last row holds a configuration
-
-
-@kernel
-def edge_space(exact, lanes, n):
-    """Fresh scratch."""
-    return EdgeSpace(
-        make_space(exact), sphere_space(lanes, n), np.empty(exact.blocks.shape[0]), np.empty((QUEUE + 1, max(n, 2)))
-    )
 
 
 @kernel
@@ -65,19 +46,6 @@ def scan_pieces(model, qa, qb, margin, resolution, space, rate, queue, count):
             queue[k, 0], queue[k, 1] = middle + radius, high
             count += 1
     return -1, 0.0
-
-
-@kernel
-def edge_blocked(exact, lanes, qa, qb, margin, resolution, space):
-    """Whether the straight motion ``qa → qb`` hits anything."""
-    count = edge_lanes(lanes, qa, qb, margin, resolution, space.lanes)
-    if count <= 0:
-        return count < 0
-    queue, pieces = space.queue, space.lanes.pieces
-    for i in range(count):
-        queue[i, 0], queue[i, 1] = pieces[i, 0], pieces[i, 1]
-    hit, _ = scan_pieces(exact, qa, qb, margin, resolution, space.exact, space.rate, queue, count)
-    return hit >= 0
 
 
 @kernel

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ._jit import kernel
-from .collide_edges import edge_blocked, edge_space
+from .lane_edges import edge_blocked, edge_space
 
 SHRINK = 0.97  # of a domain, with every motion that is blocked
 
