@@ -1,12 +1,14 @@
 """Scenes, and collision of robots with themselves and with what stands around them."""
 
-from .model import Closest, CollisionModel, Touch
+from .allowed import AllowedPairs, find_allowed_pairs
+from .model import Closest, CollisionModel, PairDistances, Sweep, Touch
 from .obstacles import Cloud, Grid, HalfSpace, Union
 from .pairs import Separation, signed_distance
 from .scene import Box, Placed, RobotSource, Scene
 from .shapes import Convex
 
 __all__ = [
+    "AllowedPairs",
     "Box",
     "Closest",
     "Cloud",
@@ -14,11 +16,14 @@ __all__ = [
     "Convex",
     "Grid",
     "HalfSpace",
+    "PairDistances",
     "Placed",
     "RobotSource",
     "Scene",
     "Separation",
+    "Sweep",
     "Touch",
     "Union",
+    "find_allowed_pairs",
     "signed_distance",
 ]

@@ -10,37 +10,24 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import as_pose
+from ..arrays import Array, IntArray, as_pose
 from ..errors import InputError, unknown_name
-from ..kernels import collide
 from ..kernels.collide import CollideModel
 from ..kernels.sphere import SphereModel
 from ..kinematics import Robot
+from .allowed import SAMPLES, by_sampling, srdf_pairs
 from .geometry import Geometry
 from .lanes_model import sphere_model
-from .nodes import (
-    Node,
-    Pair,
-    can_meet,
-    compile_model,
-    link_nodes,
-    linkages,
-    matrix,
-    neighbours,
-    pair,
-)
+from .nodes import Node, Pair, can_meet, compile_model, link_nodes, matrix, pair, slide_bounds
 from .obstacles import as_geometry
 from .shapes import Convex
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ..bodies import Body
+    from ..robots import Semantics
     from .scene import Scene
-
-SAMPLES = 500
-"""Random configurations in which a pair of links is tried; a pair that always touches is allowed to."""
-
-ALWAYS = 0.95
-"""Share of the samples from which on a pair counts as always touching."""
 
 RESOLUTION = 1e-3
 """Default of `CollisionModel.resolution`, in m."""
@@ -79,37 +66,14 @@ class Arrangement:
         twice = sorted({n.name for n in links} & {n.name for n in self.nodes[len(links) :]})
         if twice:
             raise InputError(f"{twice[0]!r} names both a link of the robot and an obstacle; rename the obstacle")
-        self.reasons: Mapping[Pair, str] = self._found_pairs(links)
+        found, _ = by_sampling(robot, links, self.clearance, SAMPLES, np.random.default_rng(0))
+        self.reasons: Mapping[Pair, str] = found
         """Why each allowed pair may touch."""
         self._compiled: CollideModel | None = None
         self._lanes: SphereModel | None = None
         self.reasons = {**self.reasons, **self._checked_pairs(allowed)}
 
     # --- what may touch ------------------------------------------------------------------------------------------
-    def _found_pairs(self, links: Sequence[Node]) -> dict[Pair, str]:
-        description = self.robot.description
-        reasons = dict.fromkeys(description.allowed_collisions, "allowed by the description")
-        reasons |= dict.fromkeys(linkages(self.robot.model, links), "parts of one coupled mechanism")
-        reasons |= dict.fromkeys(neighbours(description, {node.name for node in links}), "connected by a joint")
-        blocks = [
-            (i, j)
-            for i, a in enumerate(links)
-            for j, b in enumerate(links[:i])
-            if can_meet(self.robot.model, a, b) and pair(a.name, b.name) not in reasons
-        ]
-        if not blocks:
-            return reasons
-        model = compile_model(self.robot, links, blocks)
-        rng = np.random.default_rng(0)
-        lower, upper = np.maximum(self.robot.limits.lower, -np.pi), np.minimum(self.robot.limits.upper, np.pi)
-        q = rng.uniform(lower, upper, (SAMPLES, self.robot.n))
-        hits = np.zeros(len(blocks), np.int64)
-        collide.check(model, q, self.clearance, 0, SAMPLES, NONE, hits)
-        for (i, j), count in zip(blocks, hits, strict=True):
-            if count >= ALWAYS * SAMPLES:
-                reasons[pair(links[i].name, links[j].name)] = "touch in nearly every configuration"
-        return reasons
-
     def _checked_pairs(self, pairs: Iterable[tuple[str, str]]) -> dict[Pair, str]:
         names = [node.name for node in self.nodes]
         checked = {}
@@ -134,6 +98,13 @@ class Arrangement:
     def allow(self, pairs: Iterable[tuple[str, str]]) -> Self:
         """The model in which these pairs of names may touch, too."""
         return self._with(self.nodes, {**self.reasons, **self._checked_pairs(pairs)})
+
+    def allow_srdf(self, source: str | Path | Semantics) -> Self:
+        """The model in which the pairs of an SRDF may touch, too: a file's path, its text, or read already.
+
+        Raises `DescriptionError` for links that the robot does not have.
+        """
+        return self._with(self.nodes, {**self.reasons, **srdf_pairs(source, self.robot)})
 
     def forbid(self, pairs: Iterable[tuple[str, str]]) -> Self:
         """The model in which these pairs of names are checked again."""
@@ -239,6 +210,17 @@ class Arrangement:
         """Links without collision geometry."""
         names = set(self.names)
         return tuple(link for link in self.robot.frame_names if link not in names)
+
+    @cached_property
+    def travel(self) -> tuple[IntArray, Array, Array]:
+        """Of the sliding joints: their coordinates, multipliers and offsets ``(k, 2)``, and the most they may slide.
+
+        The bounds on motions hold up to there.
+        """
+        tree = self.robot.model
+        slides = np.flatnonzero(tree.kind != 0)
+        coordinate, gain = tree.coordinate[slides], tree.gain[slides]
+        return coordinate, gain, slide_bounds(self.robot, slides)
 
     @property
     def compiled(self) -> CollideModel:

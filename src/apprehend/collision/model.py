@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, BoolArray, IntArray, as_shaped
 from ..errors import InputError
-from ..kernels import collide, collide_edges, sphere
+from ..kernels import collide, collide_edges, collide_sweep, sphere
 from ..parallel import over_ranges
 from .arrangement import NONE, Arrangement
 
@@ -25,8 +25,6 @@ LANE_GRAIN = 512
 
 WHOLE_TURNS = 1e4
 """Joint values above this, in rad, are left to the exact check: lanes reduce angles to 1e5 only."""
-
-NO_BLOCKS = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -56,6 +54,32 @@ class Closest:
     """``(..., 3)`` unit vector along which the first moves away from the second."""
     names: tuple[tuple[str, str], ...]
     """The two names for each configuration of the flattened batch."""
+
+
+@dataclass(frozen=True, eq=False)
+class PairDistances:
+    """The smallest distance of each pair of things that may not touch, in each configuration."""
+
+    names: tuple[tuple[str, str], ...]
+    """The B pairs."""
+    distance: Array
+    """``(..., B)`` signed distance in m; a lower bound for pairs that are farther apart than was asked for."""
+    gradient: Array
+    """``(..., B, n)`` its derivative by q; zero for those pairs."""
+    points: Array
+    """``(..., B, 2, 3)`` the nearest (or deepest) points; zero for those pairs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """How much of each motion is proven free, and what ends it."""
+
+    free: BoolArray
+    """``(...)`` whether the whole motion is: nothing comes nearer than the clearance, at any instant."""
+    until: Array
+    """``(...)`` 0 … 1: up to there it is; then something is nearer than clearance + tolerance."""
+    names: tuple[tuple[str, str] | None, ...]
+    """What that is, for each motion of the flattened batch; None where it is free."""
 
 
 class CollisionModel(Arrangement):
@@ -107,9 +131,7 @@ class CollisionModel(Arrangement):
         tunnelled: what goes unseen is nearer than the clearance by less than *step*.
         """
         step = self._step(step)
-        a, b = np.broadcast_arrays(as_shaped(qa, "qa", self.robot.n), as_shaped(qb, "qb", self.robot.n))
-        rows_a, shape = self._rows(a, "qa")
-        rows_b, _ = self._rows(b, "qb")
+        rows_a, rows_b, shape = self._motions(qa, qb)
         blocked = np.zeros(len(rows_a), np.int64)
         lanes, exact, margin = self.lanes, self.compiled, self.clearance
 
@@ -120,6 +142,22 @@ class CollisionModel(Arrangement):
             over_ranges(work, len(rows_a), 1)
         return np.asarray(blocked.reshape(shape) == 0)
 
+    def _motions(self, qa: ArrayLike, qb: ArrayLike) -> tuple[Array, Array, tuple[int, ...]]:
+        a, b = np.broadcast_arrays(as_shaped(qa, "qa", self.robot.n), as_shaped(qb, "qb", self.robot.n))
+        rows_a, shape = self._rows(a, "qa")
+        rows_b, _ = self._rows(b, "qb")
+        coordinate, gain, most = self.travel
+        for name, rows in (("qa", rows_a), ("qb", rows_b)):
+            slides = np.abs(rows[:, coordinate] * gain[:, 0] + gain[:, 1])
+            if (slides > most * (1.0 + 1e-9) + 1e-9).any():
+                i, j = np.argwhere(slides > most * (1.0 + 1e-9) + 1e-9)[0]
+                joint = self.robot.joint_names[coordinate[j]]
+                raise InputError(
+                    f"{name} slides joint {joint!r} to {slides[i, j]:.4g} m from its zero; motions are bounded up "
+                    f"to its limits only, {most[j]:.4g} m"
+                )
+        return rows_a, rows_b, shape
+
     def _step(self, step: float | None) -> float:
         step = self.resolution if step is None else step
         if not (math.isfinite(step) and step > 0.0):
@@ -129,9 +167,7 @@ class CollisionModel(Arrangement):
     def edge_hits(self, qa: ArrayLike, qb: ArrayLike, step: float | None = None) -> tuple[IntArray, Array]:
         """As `edges_free`: the number of the pair of shapes that is hit (−1: free), and where (0 … 1)."""
         step = self._step(step)
-        a, b = np.broadcast_arrays(as_shaped(qa, "qa", self.robot.n), as_shaped(qb, "qb", self.robot.n))
-        rows_a, shape = self._rows(a, "qa")
-        rows_b, _ = self._rows(b, "qb")
+        rows_a, rows_b, shape = self._motions(qa, qb)
         out, where = np.full(len(rows_a), -1, np.int64), np.zeros(len(rows_a))
         model, margin = self.compiled, self.clearance
 
@@ -141,6 +177,29 @@ class CollisionModel(Arrangement):
         if len(rows_a):
             over_ranges(work, len(rows_a), 1)
         return out.reshape(shape), where.reshape(shape)
+
+    def sweep(self, qa: ArrayLike, qb: ArrayLike, tolerance: float = 1e-4) -> Sweep:
+        """How far each straight motion ``qa → qb (..., n)`` is proven free: a continuous check without resolution.
+
+        Conservative advancement (Mirtich 1996): from a configuration in which a pair is d apart, the motion is free for
+        at least (d − clearance) / v, where v bounds how fast the pair can approach: Σᵢ |q̇ᵢ| (rᵢ(a) + rᵢ(b)) over the
+        joints between them, with rᵢ the farthest that a link's points can be from the axis of joint i in any
+        configuration (1 for a sliding joint). It ends where d − clearance < *tolerance* (m), or at the end of the
+        motion. So "free" is proven but for rounding, and "not free" means nearer than clearance + *tolerance*.
+        """
+        if not (math.isfinite(tolerance) and tolerance > 0.0):
+            raise InputError(f"tolerance is {tolerance}; expected a positive length in m")
+        rows_a, rows_b, shape = self._motions(qa, qb)
+        until, number = np.zeros(len(rows_a)), np.full(len(rows_a), -1, np.int64)
+        model, margin = self.compiled, self.clearance
+
+        def work(start: int, stop: int) -> None:
+            collide_sweep.sweep(model, rows_a, rows_b, margin, tolerance, start, stop, until, number)
+
+        if len(rows_a):
+            over_ranges(work, len(rows_a), 1)
+        names = tuple(None if p < 0 else self.names_of(int(p)) for p in number)
+        return Sweep((number < 0).reshape(shape), until.reshape(shape), names)
 
     def path_free(self, path: ArrayLike) -> bool:
         """Whether the whole polyline ``(M, n)`` is free."""
@@ -183,7 +242,7 @@ class CollisionModel(Arrangement):
             raise InputError("there is no pair of things that could collide, so there is no distance")
         if len(rows):
             over_ranges(
-                lambda a, b: collide.distances(model, rows, math.inf, a, b, distance, number, out, NO_BLOCKS),
+                lambda a, b: collide.distances(model, rows, a, b, distance, number, out),
                 len(rows),
                 GRAIN,
             )
@@ -194,17 +253,48 @@ class CollisionModel(Arrangement):
         q = as_shaped(q, "q", self.robot.n)
         if q.ndim != 1:
             raise InputError(f"q has shape {q.shape}; expected one configuration ({self.robot.n},)")
-        model = self.compiled
-        gap, row = np.zeros(len(model.blocks)), np.array(q)[None]
-        least, number, points = np.zeros(1), np.zeros(1, np.int64), np.zeros((1, 9))
-        if len(gap):
-            collide.distances(model, row, self.clearance + 1e-9, 0, 1, least, number, points, gap)
+        gap = self._block_distances(np.array(q)[None], self.clearance + 1e-9)[0][0]
         touching = [
             Touch(self.nodes[a].name, self.nodes[b].name, float(d))
-            for (a, b), d in zip(model.blocks[:, :2], gap, strict=True)
+            for (a, b), d in zip(self.compiled.blocks[:, :2], gap, strict=True)
             if d <= self.clearance
         ]
         return tuple(sorted(touching, key=lambda touch: touch.distance))
+
+    def distances(self, q: ArrayLike, within: float = math.inf) -> PairDistances:
+        """Smallest signed distance of every pair of things for each ``q (..., n)``, with its derivative by q.
+
+        What is farther apart than *within* (m) is only bounded from below. For optimisers that keep all pairs apart.
+        """
+        if math.isnan(within):
+            raise InputError("within is NaN; expected a distance in m")
+        rows, shape = self._rows(q)
+        distance, number, out = self._block_distances(rows, within)
+        model, pairs, n = self.compiled, number.shape[1], self.robot.n
+        repeated, slope = np.repeat(rows, pairs, axis=0), np.zeros((len(rows) * pairs, n))
+        flat, points = number.reshape(-1), out.reshape(-1, 9)
+        out[number < 0] = 0.0
+        if len(repeated):
+            over_ranges(
+                lambda a, b: collide.gradients(model, repeated, flat, points, a, b, slope), len(repeated), GRAIN
+            )
+        names = tuple((self.nodes[a].name, self.nodes[b].name) for a, b in model.blocks[:, :2])
+        return PairDistances(
+            names,
+            distance.reshape(*shape, pairs),
+            slope.reshape(*shape, pairs, n),
+            points[:, :6].reshape(*shape, pairs, 2, 3),
+        )
+
+    def _block_distances(self, rows: Array, within: float) -> tuple[Array, IntArray, Array]:
+        model = self.compiled
+        size = (len(rows), len(model.blocks))
+        distance, number, out = np.zeros(size), np.full(size, -1, np.int64), np.zeros((*size, 9))
+        if distance.size:
+            over_ranges(
+                lambda a, b: collide.block_distances(model, rows, within, a, b, distance, number, out), len(rows), GRAIN
+            )
+        return distance, number, out
 
     def names_of(self, number: int) -> tuple[str, str]:
         """The two names of a pair of shapes that `hits` answered."""

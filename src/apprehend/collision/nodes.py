@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..kernels.collide import CollideModel
 from ..kernels.tree import TreeModel
@@ -116,7 +116,6 @@ def reach(tree: TreeModel, robot: Robot, node: Node) -> Array:
     A revolute joint moves a point by its distance from the axis, which the lengths of the links in between bound.
     """
     out = np.zeros(len(tree.kind))
-    lower, upper = robot.limits.lower, robot.limits.upper
     radius, across = 0.0, 0.0  # of the ball about the joint's origin that holds the node, and about its axis
     for shape in node.shapes:
         centre, r = shape.ball
@@ -127,14 +126,19 @@ def reach(tree: TreeModel, robot: Robot, node: Node) -> Array:
             out[joint] = across
         else:
             out[joint] = 1.0
-            c, (gain, offset) = tree.coordinate[joint], tree.gain[joint]
-            ends = np.abs(np.array([lower[c], upper[c]]) * gain + offset)
-            travel = float(ends.max()) if np.isfinite(ends).all() else UNBOUNDED_TRAVEL
-            radius += travel
+            radius += float(slide_bounds(robot, np.array([joint]))[0])
         x, y, z = tree.place[joint, 9:]
         across = float(np.hypot(x, y)) + radius
         radius += float(np.sqrt(x * x + y * y + z * z))
     return out
+
+
+def slide_bounds(robot: Robot, joints: IntArray) -> Array:
+    """How far sliding joints are from their zero at most, within their limits; `UNBOUNDED_TRAVEL` without limits."""
+    tree, limits = robot.model, robot.limits
+    c, gain = tree.coordinate[joints], tree.gain[joints]
+    ends = np.abs(np.stack([limits.lower[c], limits.upper[c]]) * gain[:, 0] + gain[:, 1])
+    return np.where(np.isfinite(ends).all(axis=0), ends.max(axis=0, initial=0.0), UNBOUNDED_TRAVEL)
 
 
 def node_ball(node: Node) -> Array:

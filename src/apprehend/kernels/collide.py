@@ -292,35 +292,45 @@ def measure(model, p, space, out, best, within):
 
 
 @kernel
-def distances(model, q, within, start, stop, distance, pair, out, of_blocks):
-    """Smallest signed distance over all pairs for every row of ``q``, its pair, and ``out (N, 9)`` as in `measure`.
-
-    With ``of_blocks (B,)`` also the smallest of every block, for the last row; blocks farther apart than *within* get
-    a lower bound above it.
-    """
+def distances(model, q, start, stop, distance, pair, out):
+    """Smallest signed distance over all pairs for every row of ``q``, its pair, and ``out (N, 9)`` as in `measure`."""
     space = make_space(model)
     blocks, nodes, balls = model.blocks, model.nodes, space.balls
-    each = of_blocks.shape[0] > 0
     for i in range(start, stop):
         place(model, q[i], space)
         best, found = 1e300, -1
         for block in range(blocks.shape[0]):
-            gap = node_gap(nodes, balls, blocks[block, 0], blocks[block, 1])
-            if gap >= best and not each:
+            if node_gap(nodes, balls, blocks[block, 0], blocks[block, 1]) >= best:
                 continue
-            least = gap if each and gap > within else 1e300
-            if least == 1e300:
-                limit = 1e300 if each else best
-                for p in range(blocks[block, 2], blocks[block, 3]):
-                    d, written = measure(model, p, space, out[i], limit, within)
-                    least = min(least, d)
-                    if written:
-                        limit = d
-                        if d < best:
-                            best, found = d, p
-            if each:
-                of_blocks[block] = least
+            for p in range(blocks[block, 2], blocks[block, 3]):
+                d, written = measure(model, p, space, out[i], best, 1e300)
+                if written:
+                    best, found = d, p
         distance[i], pair[i] = best, found
+
+
+@kernel
+def block_distances(model, q, within, start, stop, distance, pair, out):
+    """The same for every block: ``distance, pair (N, B)``, ``out (N, B, 9)``.
+
+    Blocks farther apart than *within* get a lower bound above it, and −1 as their pair.
+    """
+    space = make_space(model)
+    blocks, nodes, balls = model.blocks, model.nodes, space.balls
+    for i in range(start, stop):
+        place(model, q[i], space)
+        for block in range(blocks.shape[0]):
+            gap = node_gap(nodes, balls, blocks[block, 0], blocks[block, 1])
+            distance[i, block], pair[i, block] = gap, -1
+            if gap > within:
+                continue
+            best, least = 1e300, 1e300
+            for p in range(blocks[block, 2], blocks[block, 3]):
+                d, written = measure(model, p, space, out[i, block], best, within)
+                least = min(least, d)
+                if written:
+                    best, pair[i, block] = d, p
+            distance[i, block] = least
 
 
 @kernel
@@ -332,9 +342,11 @@ def gradients(model, q, pair, points, start, stop, out):
     links, joints, ints, pairs = model.links, model.joints, model.shapes.ints, model.pairs
     poses = np.zeros((links.shape[0], 12))
     for i in range(start, stop):
-        move_joints(links, joints, q[i], poses)
         for j in range(q.shape[1]):
             out[i, j] = 0.0
+        if pair[i] < 0:
+            continue
+        move_joints(links, joints, q[i], poses)
         nx, ny, nz = points[i, 6], points[i, 7], points[i, 8]
         for side in range(2):
             sign = 1.0 - 2.0 * side

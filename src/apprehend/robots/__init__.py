@@ -28,7 +28,7 @@ from .load import load_description
 from .meshes import link_surface, load_shape_mesh, read_mesh, shape_surface
 from .mjcf import read_mjcf
 from .outline import outline
-from .srdf import Semantics, read_srdf
+from .srdf import Semantics, parse_srdf, read_srdf
 from .table_files import read_dh, read_table
 from .urdf import parse_urdf, read_urdf
 
@@ -54,6 +54,7 @@ __all__ = [
     "load_description",
     "load_shape_mesh",
     "outline",
+    "parse_srdf",
     "parse_urdf",
     "read_dh",
     "read_mesh",

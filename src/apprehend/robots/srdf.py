@@ -22,7 +22,15 @@ class Semantics:
 def read_srdf(path: str | Path) -> Semantics:
     """Read an SRDF file; raises `DescriptionError` with file and line."""
     path = Path(path)
-    doc = Document(read_text(path), path)
+    return _read(Document(read_text(path), path), path)
+
+
+def parse_srdf(text: str | bytes, source: str | Path = "srdf") -> Semantics:
+    """Read SRDF from a text; *source* is what errors call it."""
+    return _read(Document(text.encode() if isinstance(text, str) else text, source), Path(source))
+
+
+def _read(doc: Document, path: Path) -> Semantics:
     if local(doc.root) != "robot":
         doc.fail(doc.root, f"expected <robot> as the outermost element of an SRDF, found <{local(doc.root)}>")
     pairs = set()
