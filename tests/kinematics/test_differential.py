@@ -15,6 +15,7 @@ from apprehend.kinematics import (
     joint_torques,
     leaf_to_root_jacobian,
     rpy_jacobian,
+    rpy_jacobian_derivative,
     velocity,
 )
 from apprehend.spatial import euler, se3
@@ -70,6 +71,19 @@ def test_rpy_jacobian_is_the_derivative_of_the_angles(seed: int) -> None:
     assert rpy_jacobian(robot, np.tile(q, (2, 3, 1)), frame).shape == (2, 3, 6, robot.n)
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_rate_of_the_rpy_jacobian_is_its_difference(seed: int) -> None:
+    robot, frame, rng = robot_of(seed)
+    q, qd = rng.normal(size=(2, 4, robot.n))
+    J, dJ = rpy_jacobian_derivative(robot, q, qd, frame)
+    np.testing.assert_allclose(J, rpy_jacobian(robot, q, frame), atol=1e-12)
+    h = 1e-6
+    slope = (rpy_jacobian(robot, q + h * qd, frame) - rpy_jacobian(robot, q - h * qd, frame)) / (2 * h)
+    np.testing.assert_allclose(dJ, slope, rtol=1e-6, atol=1e-6)
+    one, rate = rpy_jacobian_derivative(robot, q[0], qd, frame)
+    assert one.shape[-2:] == rate.shape[-2:] == (6, robot.n)
+
+
 def test_rpy_jacobian_does_not_exist_at_the_lock() -> None:
     robot = Robot(random_tree(0, 1))
     turned = np.eye(4)
@@ -86,7 +100,7 @@ def test_the_scripts_ways_give_the_same_numbers(seed: int) -> None:
     poe = ProductOfExponentials.of(robot, frame)
     np.testing.assert_allclose(poe.fk(q), robot.fk(q, frame), atol=1e-13)
     np.testing.assert_allclose(poe.jacobian(q), robot.jacobian(q, frame, "spatial"), atol=1e-13)
-    np.testing.assert_allclose(leaf_to_root_jacobian(robot, q[0], frame), robot.jacobian(q[0], frame), atol=1e-13)
+    np.testing.assert_allclose(leaf_to_root_jacobian(robot, q, frame), robot.jacobian(q, frame), atol=1e-13)
 
 
 def test_statics_are_dual_to_velocities_and_back() -> None:

@@ -74,27 +74,54 @@ def rpy_jacobian(robot: Robot, q: ArrayLike, frame: str) -> Array:
     R_z y, z of E. E is singular at pitch ±90°, where the analytic Jacobian does not exist: `InputError`.
     """
     T, J = robot.fk_jacobian(q, frame)
+    inverse, _ = _rpy_rates(_rpy(T, frame))
+    out = J.copy()
+    out[..., 3:, :] = inverse @ J[..., 3:, :]
+    return out
+
+
+def rpy_jacobian_derivative(robot: Robot, q: ArrayLike, qd: ArrayLike, frame: str) -> tuple[Array, Array]:
+    """`rpy_jacobian` and its time derivative along q̇, both ``(..., 6, n)``: d(E⁻¹ J_ω)/dt by the product rule."""
+    J, dJ = jacobian_derivative(robot, q, qd, frame)
+    angles = _rpy(robot.fk(q, frame), frame)
+    inverse, _ = _rpy_rates(angles)
+    out, rate = J.copy(), dJ.copy()
+    out[..., 3:, :] = inverse @ J[..., 3:, :]
+    turning = np.einsum("...ij,...j->...i", out[..., 3:, :], as_shaped(qd, "qd", robot.n))
+    _, change = _rpy_rates(np.broadcast_to(angles, turning.shape), turning)
+    rate[..., 3:, :] = change @ J[..., 3:, :] + inverse @ dJ[..., 3:, :]
+    return out, rate
+
+
+def _rpy(T: Array, frame: str) -> Array:
+    """Roll, pitch and yaw ``(..., 3)``; `InputError` where the analytic Jacobian does not exist."""
     angles = euler.from_matrix(T[..., :3, :3], "xyz", "extrinsic")
-    cos_pitch = np.cos(angles[..., 1])
-    if (np.abs(cos_pitch) < 1e-9).any():
+    if (np.abs(np.cos(angles[..., 1])) < 1e-9).any():
         raise InputError(
             f"q puts frame {frame!r} at a pitch of ±90°, where roll and yaw are not determined and the analytic "
             "Jacobian does not exist; use jacobian(), which has no such points"
         )
-    cy, sy = np.cos(angles[..., 2]), np.sin(angles[..., 2])
-    tan_pitch = np.tan(angles[..., 1])
-    zero, one = np.zeros_like(cy), np.ones_like(cy)
-    inverse = np.stack(
-        [
-            np.stack([cy / cos_pitch, sy / cos_pitch, zero], -1),
-            np.stack([-sy, cy, zero], -1),
-            np.stack([cy * tan_pitch, sy * tan_pitch, one], -1),
-        ],
-        -2,
-    )
-    out = J.copy()
-    out[..., 3:, :] = inverse @ J[..., 3:, :]
-    return out
+    return angles
+
+
+def _rpy_rates(angles: Array, rates: Array | None = None) -> tuple[Array, Array]:
+    """E⁻¹ ``(..., 3, 3)`` from ω to the rates of roll, pitch and yaw, and its derivative along *rates* ``(..., 3)``."""
+    c, s = np.cos(angles[..., 2]), np.sin(angles[..., 2])
+    secant, tangent = 1.0 / np.cos(angles[..., 1]), np.tan(angles[..., 1])
+    zero, one = np.zeros_like(c), np.ones_like(c)
+    value = [[c * secant, s * secant, zero], [-s, c, zero], [c * tangent, s * tangent, one]]
+    pitch, yaw = (zero, zero) if rates is None else (rates[..., 1], rates[..., 2])
+    bend, slope = secant * tangent * pitch, secant**2 * pitch
+    change = [
+        [c * bend - s * secant * yaw, s * bend + c * secant * yaw, zero],
+        [-c * yaw, -s * yaw, zero],
+        [c * slope - s * tangent * yaw, s * slope + c * tangent * yaw, zero],
+    ]
+    return _stacked(value), _stacked(change)
+
+
+def _stacked(rows: list[list[Array]]) -> Array:
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def joint_torques(robot: Robot, q: ArrayLike, frame: str, wrench: ArrayLike, reference: str = "mixed") -> Array:

@@ -74,20 +74,21 @@ class ProductOfExponentials:
 
 
 def leaf_to_root_jacobian(robot: Robot, q: ArrayLike, frame: str) -> Array:
-    """Mixed Jacobian ``(6, n)`` by the iterative algorithm for trees (G 1.7.2), from the frame up to the root.
+    """Mixed Jacobian ``(..., 6, n)`` by the iterative algorithm for trees (G 1.7.2), from the frame up to the root.
 
     T grows from the leaf: at each joint its unit twist is brought into the tool's frame by Ad(T⁻¹); in the end all
     columns are turned into the axes of the world.
     """
     model = robot.chain_model(frame)
     vector = as_shaped(q, "q", robot.n)
-    J = np.zeros((6, robot.n))
+    J = np.zeros((*vector.shape[:-1], 6, robot.n))
     T = se3.transform(model.place[-1, :9].reshape(3, 3), model.place[-1, 9:])
     for i in reversed(range(len(model.kind))):
         c, revolute = model.coordinate[i], model.kind[i] == REVOLUTE
         xi = np.eye(6)[5 if revolute else 2]
-        theta = model.gain[i, 0] * vector[c] + model.gain[i, 1]
-        J[:, c] += model.gain[i, 0] * se3.adjoint(se3.inverse(T)) @ xi
-        T = se3.transform(model.place[i, :9].reshape(3, 3), model.place[i, 9:]) @ se3.exp(theta * xi) @ T
-    R = T[:3, :3]
-    return np.vstack([R @ J[:3], R @ J[3:]])
+        theta = model.gain[i, 0] * vector[..., c] + model.gain[i, 1]
+        J[..., c] += model.gain[i, 0] * se3.adjoint(se3.inverse(T)) @ xi
+        place = se3.transform(model.place[i, :9].reshape(3, 3), model.place[i, 9:])
+        T = place @ se3.exp(theta[..., None] * xi) @ T
+    R = T[..., :3, :3]
+    return np.concatenate([R @ J[..., :3, :], R @ J[..., 3:, :]], axis=-2)

@@ -58,20 +58,12 @@ def measure(surfaces: Surfaces, opened: Array, closed: Array, R: Array, patch: P
 
 def _efforts(robot: Robot) -> Array:
     """What each coordinate can exert ``(n,)``: its joint's limit, or less where its motors give less."""
-    description = robot.description
-    gains = {j.name: (j.mimic.joint, j.mimic.multiplier) if j.mimic else (j.name, 1.0) for j in description.joints}
-    motors: dict[str, float] = {}
-    for actuator in description.actuators:
-        arms: dict[str, float] = {}
-        for joint, arm in actuator.arms.items():
-            leader, multiplier = gains[joint]
-            arms[leader] = arms.get(leader, 0.0) + multiplier * arm
-        strongest = max(abs(actuator.lower), abs(actuator.upper))
-        for leader, arm in arms.items():
-            if arm:
-                motors[leader] = motors.get(leader, 0.0) + abs(arm) * strongest
     given = robot.limits.effort
-    return np.array([min(e, motors.get(n, np.inf)) for n, e in zip(robot.joint_names, given, strict=True)])
+    if not robot.description.actuators:
+        return given
+    motors = robot.transmission
+    driven = (motors.matrix != 0.0).any(axis=1)
+    return np.where(driven, np.abs(motors.torque_range()).max(axis=1), given)
 
 
 def _width_slope(jaw: ParallelJaw, q: Array) -> Array:

@@ -22,7 +22,9 @@ from ..kernels.coriolis import coriolis_matrix
 from ..kernels.tree import TreeModel
 from ..robots.description import Description, Joint, JointType
 from . import differential, dynamics, memory
+from .loops import LoopConstraint
 from .model import chain_model, frame_names, tree_model
+from .transmission import Transmission
 
 GRAIN = 2048
 """Smallest share of a batch that is worth a thread."""
@@ -169,6 +171,16 @@ class Robot:
         if np.isfinite(lower) and np.isfinite(upper):
             return 0.5 * (lower + upper)
         return min(max(0.0, lower), upper)
+
+    @cached_property
+    def transmission(self) -> Transmission:
+        """The motors on the coordinates, with the limits of both sides (see `Transmission`)."""
+        return Transmission.motors(self)
+
+    @cached_property
+    def loops(self) -> tuple[LoopConstraint, ...]:
+        """The constraints of closed chains that were cut (``Robot.load(..., loops="cut")``); see `close_loops`."""
+        return tuple(LoopConstraint(self, loop) for loop in self.description.loops)
 
     # poses and Jacobians ----------------------------------------------------------------------------------------
 
