@@ -8,6 +8,7 @@ import pytest
 from apprehend import ik
 from apprehend.errors import InputError
 from apprehend.ik import IKStatus
+from apprehend.ik.chain import prepare
 
 from .makers import configurations, two_arms
 
@@ -60,3 +61,67 @@ def test_failure_and_bad_arguments() -> None:
         ik.solve_frames(robot, T, TIPS, tolerance=-1.0)
     with pytest.raises(InputError, match="max_starts is 0"):
         ik.solve_frames(robot, T, TIPS, max_starts=0)
+
+
+def torn(count: int) -> tuple[object, np.ndarray]:
+    """Two arms whose targets ask for opposite ends of the torso's range."""
+    robot = two_arms(2)
+    a, b = configurations(robot, count, 1), configurations(robot, count, 2)
+    a[:, 0], b[:, 0] = -0.95, 0.95
+    return robot, np.stack([robot.fk(a, TIPS[0]), robot.fk(b, TIPS[1])], axis=1)
+
+
+def test_reasons_of_several_frames() -> None:
+    robot, T = torn(60)
+    sol = ik.solve_frames(robot, T, TIPS)
+    failed = ~sol.success
+    assert set(sol.status[failed]) == {IKStatus.CONFLICT, IKStatus.LIMITS}
+    assert (sol.at_fault == -1).all()
+    i = int(np.flatnonzero(sol.status == IKStatus.CONFLICT)[0])
+    assert "every frame reaches its target alone" in sol.reason(i)
+    j = int(np.flatnonzero(sol.status == IKStatus.LIMITS)[0])
+    assert "only outside the joint limits" in sol.reason(j)
+    assert sol.limiting[failed].any()
+    assert robot.limits.contains(sol.q).all()
+    quick = ik.solve_frames(robot, T, TIPS, diagnose=False)
+    assert (quick.status[~quick.success] == IKStatus.NOT_FOUND).all()
+    T[:, 1, :3, 3] *= 0.02  # near the axis of the torso, where the right arm can hardly come
+    T[0, 1, 0, 3] += 30.0
+    alone = ik.solve_frames(robot, T, TIPS)
+    assert 0.2 < (alone.at_fault[~alone.success] == 1).mean() < 1.0
+    assert alone.certified[0]
+    assert "because of 'right_tip' alone: no joint vector reaches the target (certified" in alone.reason(0)
+
+
+def test_the_nearest_joint_vector_for_several_frames_is_a_minimum() -> None:
+    optimize = pytest.importorskip("scipy.optimize")
+    from scipy.spatial.transform import Rotation
+
+    robot, T = torn(40)
+    sol = ik.solve_frames(robot, T, TIPS)
+    reach = max(prepare(robot, tip).reach for tip in TIPS)
+
+    def cost(q: np.ndarray, target: np.ndarray) -> float:
+        total = 0.0
+        for tip, goal in zip(TIPS, target, strict=True):
+            X = robot.fk(q, tip)
+            total += float((((X[:3, 3] - goal[:3, 3]) / reach) ** 2).sum())
+            total += float((Rotation.from_matrix(X[:3, :3] @ goal[:3, :3].T).as_rotvec() ** 2).sum())
+        return total
+
+    bounds = list(zip(robot.limits.lower, robot.limits.upper, strict=True))
+    for i in np.flatnonzero(~sol.success)[:5]:
+        ours = cost(sol.q[i], T[i])
+        polished = optimize.minimize(cost, sol.q[i], (T[i],), method="L-BFGS-B", bounds=bounds).fun
+        assert ours <= polished * (1.0 + 1e-4) + 1e-12
+
+
+def test_more_bad_arguments() -> None:
+    robot = two_arms(2)
+    T = np.stack([robot.fk(robot.home, tip) for tip in TIPS])
+    with pytest.raises(InputError, match="frames is 'left_tip'; expected two or more"):
+        ik.solve_frames(robot, T, "left_tip")
+    box = np.full((2, 6), 1e-6)
+    box[1] = np.inf
+    with pytest.raises(InputError, match="tolerance of frame 'right_tip' is inf in all axes"):
+        ik.solve_frames(robot, T, TIPS, tolerance=box)

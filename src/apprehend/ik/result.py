@@ -21,6 +21,7 @@ class IKStatus(Status):
     COLLISION = "the target is reached within the limits, but no solution found was accepted as free of collision"
     SINGULAR = "the chain comes close, but is singular there: the tolerance is met slowly or not at all"
     NOT_FOUND = "no start led to the target"
+    CONFLICT = "every frame reaches its target alone, but no start led all of them there at once"
 
     @property
     def code(self) -> int:
@@ -53,6 +54,7 @@ class IKResult(Result):
     limiting: BoolArray  # (..., n)
     frame: str
     joint_names: tuple[str, ...]
+    at_fault: IntArray | None = None  # (...) of several frames: the one that cannot reach its target alone, or −1
 
     @property
     def success(self) -> Any:
@@ -80,6 +82,8 @@ class IKResult(Result):
         status = _STATUSES[int(self.codes[index])]
         distance, angle = self.residual[index]
         name = f"{self.frame!r}"
+        if self.at_fault is not None and self.at_fault[index] >= 0:
+            name += f", because of {self.frame.split(', ')[int(self.at_fault[index])]!r} alone"
         nearest = f"the nearest pose found is {distance:.3g} m and {angle:.3g} rad away"
         stuck = [joint for joint, at in zip(self.joint_names, self.limiting[index], strict=True) if at]
         if stuck:

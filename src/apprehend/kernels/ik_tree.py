@@ -19,6 +19,7 @@ from .ik_step import normal_equations
 from .ik_tasks import task_block
 from .lanes import LANES
 from .tree import tree_block
+from .vector import larger, load, magnitude, select, smaller, splat, store
 
 L = LANES
 
@@ -26,51 +27,78 @@ L = LANES
 @kernel
 def box_rows(e, box, scale, total, inside):
     """Errors over ``scale (R)``; inside a loose ``box (R)`` they are zero, outside they are measured from half of it."""
-    total[:] = 0.0
-    inside[:] = 1.0
+    sum_, all_ = splat(0.0), splat(1.0)
     for r in range(box.shape[0]):
-        for l in range(L):
-            x = e[r * L + l]
-            if abs(x) > box[r]:
-                inside[l] = 0.0
-            if box[r] > LOOSE * scale[r]:
-                x = 0.0 if abs(x) <= box[r] else x - math.copysign(0.5 * box[r], x)
-            x /= scale[r]
-            e[r * L + l] = x
-            total[l] += x * x
+        x = load(e, r * L)
+        beyond = magnitude(x) > box[r]
+        all_ = select(beyond, 0.0, all_)
+        if box[r] > LOOSE * scale[r]:
+            x = select(beyond, x - select(x < 0.0, -0.5 * box[r], 0.5 * box[r]), 0.0)
+        x = x * (1.0 / scale[r])
+        store(e, r * L, x)
+        sum_ = sum_ + x * x
+    store(total, 0, sum_)
+    store(inside, 0, all_)
 
 
 @kernel
 def mask_block(J, e, scale, q, lower, upper, rows, n):
     """Scale the rows, leave out satisfied ones, and coordinates at a limit that the gradient pushes outward."""
-    for r in range(rows):
-        for c in range(n):
-            x = J[(r * n + c) * L : (r * n + c + 1) * L]
-            for l in range(L):
-                x[l] = 0.0 if e[r * L + l] == 0.0 else x[l] / scale[r]
-    push = np.empty(L)
     for c in range(n):
-        push[:] = 0.0
+        push = splat(0.0)
         for r in range(rows):
-            for l in range(L):
-                push[l] += J[(r * n + c) * L + l] * e[r * L + l]
-        for l in range(L):
-            v = q[c * L + l]
-            out = ((v <= lower[c]) & (push[l] < 0.0)) | ((v >= upper[c]) & (push[l] > 0.0))
-            push[l] = 0.0 if out else 1.0
+            o = (r * n + c) * L
+            x = load(e, r * L)
+            v = select(x == 0.0, 0.0, load(J, o) * (1.0 / scale[r]))
+            store(J, o, v)
+            push = push + v * x
+        v = load(q, c * L)
+        out = ((v <= lower[c]) & (push < 0.0)) | ((v >= upper[c]) & (push > 0.0))
         for r in range(rows):
-            for l in range(L):
-                J[(r * n + c) * L + l] *= push[l]
+            o = (r * n + c) * L
+            store(J, o, select(out, 0.0, load(J, o)))
+
+
+@kernel
+def advance(q, step, lower, upper, n):
+    """``q += step``, shortened as a whole to `STEP`, then clamped to the limits."""
+    largest = splat(STEP)
+    for c in range(n):
+        largest = larger(largest, magnitude(load(step, c * L)))
+    share = STEP / largest
+    for c in range(n):
+        v = load(q, c * L) + load(step, c * L) * share
+        store(q, c * L, smaller(larger(v, lower[c]), upper[c]))
 
 
 @kernel
 def solve_tree(
-    tree, tasks, data, box, scale, lower, upper, low, high, fixed, guesses, seed, starts, first, last, out, found, used
+    tree,
+    tasks,
+    data,
+    box,
+    scale,
+    lower,
+    upper,
+    low,
+    high,
+    fixed,
+    guesses,
+    seed,
+    starts,
+    first,
+    last,
+    out,
+    found,
+    used,
+    least,
+    nearest,
 ):
     """Solve the targets first … of ``data (N, T, 16)``; start s < S of target i is ``guesses[i, s] (N, S, n)``, later
     ones are random between *low* and *high*, where not *fixed*.
 
     ``out (N, n)``, ``found (N)`` 0 or 1, ``used (N)`` starts. Every lane works on a target of its own.
+    Unless it is empty, ``least (N)`` becomes the least squared error met, at ``nearest (N, n)``.
     """
     n = lower.shape[0]
     rows = box.shape[0]
@@ -118,6 +146,10 @@ def solve_tree(
             t = owner[l]
             if t < 0:
                 continue
+            if least.shape[0] > 0 and total[l] < least[t]:
+                least[t] = total[l]
+                for c in range(n):
+                    nearest[t, c] = q[c * L + l]
             age[l] += 1.0
             late = age[l] >= 2.0 * PATIENCE
             if age[l] == 6.0 * math.floor(age[l] / 6.0):
@@ -140,10 +172,4 @@ def solve_tree(
         fresh = following < last
         mask_block(J, e, scale, q, lower, upper, rows, n)
         normal_equations(J, e, 0, rows, n, n, damping, H, step)
-        for l in range(L):
-            largest = STEP
-            for c in range(n):
-                largest = max(largest, abs(step[c * L + l]))
-            for c in range(n):
-                v = q[c * L + l] + step[c * L + l] * STEP / largest
-                q[c * L + l] = min(max(v, lower[c]), upper[c])
+        advance(q, step, lower, upper, n)
