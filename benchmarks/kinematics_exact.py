@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation as Peer
 
-from apprehend.spatial import euler, se3, so3
+from apprehend.spatial import Pose, euler, se3, so3
 
 
 def main() -> None:
@@ -17,7 +17,7 @@ def main() -> None:
     w /= np.linalg.norm(w, axis=1, keepdims=True)
     near = [np.pi - 10.0**-k for k in range(2, 13)]
     angles = [np.pi, *near, 0.0, 1e-300, 1e-100, 1e-20, 1e-9, 1e-6, 1e-3, *np.linspace(0.01, np.pi, 200)]
-    ours = theirs = screws = 0.0
+    ours = theirs = motions = screws = 0.0
     for angle in angles:
         R = so3.exp(angle * w)
         ours = max(ours, float(np.abs(so3.exp(so3.log(R)) - R).max()))
@@ -25,11 +25,11 @@ def main() -> None:
         theirs = max(theirs, float(np.abs(again - R).max()))
         for size in (1.0, 1e3):
             T = se3.exp(np.hstack([size * rng.normal(size=w.shape), angle * w]))
-            error = np.abs(se3.exp(se3.log(T)) - T)
-            scale = max(1.0, float(np.abs(T[:, :3, 3]).max()))
-            screws = max(screws, float(error[:, :3, :3].max()), float(error[:, :3, 3].max()) / scale)
+            motions = max(motions, difference(se3.exp(se3.log(T)), T))
+            screws = max(screws, difference(Pose(T).screw().motion().matrix, T))
     print(f"  exp(log R):                       {ours:.1e}   (SciPy {theirs:.1e})")
-    print(f"  exp(log T), translations to 1e3:  {screws:.1e}   relative to their size")
+    print(f"  exp(log T), translations to 1e3:  {motions:.1e}   relative to their size")
+    print(f"  screws of these motions, back:    {screws:.1e}")
     worst = peer = 0.0
     for sequence in euler.SEQUENCES:
         lock = 0.0 if sequence[0] == sequence[2] else np.pi / 2
@@ -42,6 +42,13 @@ def main() -> None:
         angles_of_peer = _quiet_euler(Peer.from_matrix(R), upper)
         peer = max(peer, float(np.abs(Peer.from_euler(upper, angles_of_peer).as_matrix() - R).max()))
     print(f"  Euler angles near gimbal lock:    {worst:.1e}   (SciPy {peer:.1e})")
+
+
+def difference(again: np.ndarray, T: np.ndarray) -> float:
+    """Largest entry of the difference, that of translations relative to the largest one."""
+    error = np.abs(again - T)
+    scale = max(1.0, float(np.abs(T[:, :3, 3]).max()))
+    return max(float(error[:, :3, :3].max()), float(error[:, :3, 3].max()) / scale)
 
 
 def _quiet_euler(rotation: Peer, sequence: str) -> np.ndarray:

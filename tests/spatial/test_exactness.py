@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from apprehend.arrays import Array
-from apprehend.spatial import euler, quaternion, se3, so3
+from apprehend.spatial import Pose, euler, quaternion, se3, so3
 from tests.support import reference
 
 EDGES = np.concatenate(
@@ -57,6 +57,21 @@ def test_motions_return_from_their_logarithm_relative_to_their_size() -> None:
             again = se3.exp(se3.log(T))
             assert np.abs(again[:, :3, :3] - T[:, :3, :3]).max() <= WORST
             assert np.abs(again[:, :3, 3] - T[:, :3, 3]).max() <= WORST * max(size * 4, 1e-300)
+
+
+def test_motions_return_from_their_screws_relative_to_their_size() -> None:
+    rng = np.random.default_rng(4)
+    w = axes(200)
+    for angle in [*EDGES, 1e-310, 5e-324]:
+        for size in (0.0, 1e-9, 1.0, 1e3):
+            T = Pose.exp(np.hstack([size * rng.normal(size=w.shape), angle * w]))
+            screw = T.screw()
+            again = screw.motion().matrix
+            assert np.abs(again[:, :3, :3] - T.matrix[:, :3, :3]).max() <= WORST
+            assert np.abs(again[:, :3, 3] - T.translation).max() <= WORST * max(size * 4, 1e-300)
+            assert (
+                np.abs((screw.point * screw.direction).sum(axis=-1)) <= 1e-14 * np.abs(screw.point).max(axis=-1)
+            ).all()
 
 
 def test_quaternions_return() -> None:

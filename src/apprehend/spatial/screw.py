@@ -87,6 +87,7 @@ class Screw:
         with np.errstate(over="ignore"):
             pitch = (along * moment).sum(axis=-1) / np.where(finite, length, 1.0)
             point = np.cross(along, moment) / np.where(finite, length, 1.0)[..., None]
+        finite &= np.isfinite(pitch) & np.isfinite(point).all(axis=-1)  # else too little to tell from none
         return cls(
             direction=np.where(finite[..., None], along, along_free),
             point=np.where(finite[..., None], point, 0.0),
