@@ -1,6 +1,7 @@
 """Algebra of the cones of a cone program, in wide numbers: half-lines and second-order cones, side by side in one vector.
 
-*cones* lists their sizes, all odd: the entries behind the first go in pairs, filled up with columns of zeros. Here are
+All vectors of a program are one array ``V (vectors, n, WIDTH)``, and functions are told which of them to take: arrays
+are expensive to pass. *cones* lists their sizes, all odd: the entries behind the first go in pairs, filled up with columns of zeros. Here are
 Nesterov and Todd's scaling W of a primal-dual pair of points, products with it, the quotient of the cones' Jordan
 algebra, and the room that a step leaves.
 """
@@ -9,19 +10,22 @@ from __future__ import annotations
 
 from ._jit import kernel
 from .cone_rows import backward, factor, forward
-from .wide import larger, load, load2, root, store, store2, wide
+from .wide import larger, load2, root, store2, wide
+
+SCALING, BETA, LAMBDA = 0, 1, 2
+"""Vectors that hold the scaling: unit vectors w, factors β (at the first entry of each cone), and λ."""
 
 
 @kernel
-def scaling(x, z, cones, w, beta, lam):  # type: ignore[no-untyped-def]
-    """Nesterov–Todd scaling of each cone: unit vector w and factor β with ``W z = W⁻¹ x = λ``; NaN outside the cone."""
+def scaling(V, cones, x, z):  # type: ignore[no-untyped-def]
+    """Nesterov–Todd scaling of each cone: unit vector w and factor β with ``W z = W⁻¹ x = λ``; NaN outside."""
     s = 0
     for i in range(cones.shape[0]):
         end = s + cones[i]
-        x0, z0 = load(x, s), load(z, s)
+        x0, z0 = load2(V, x, s), load2(V, z, s)
         xs, zs, xz = wide(0.0), wide(0.0), x0 * z0
         for j in range(s + 1, end, 2):
-            x1, x2, z1, z2 = load(x, j), load(x, j + 1), load(z, j), load(z, j + 1)
+            x1, x2, z1, z2 = load2(V, x, j), load2(V, x, j + 1), load2(V, z, j), load2(V, z, j + 1)
             xs += x1 * x1 + x2 * x2
             zs += z1 * z1 + z2 * z2
             xz += x1 * z1 + x2 * z2
@@ -33,98 +37,98 @@ def scaling(x, z, cones, w, beta, lam):  # type: ignore[no-untyped-def]
         ix, iz = ix * h, iz * h
         w0, dot = x0 * ix + z0 * iz, wide(0.0)
         for j in range(s + 1, end, 2):
-            z1, z2 = load(z, j), load(z, j + 1)
-            w1, w2 = load(x, j) * ix - z1 * iz, load(x, j + 1) * ix - z2 * iz
+            z1, z2 = load2(V, z, j), load2(V, z, j + 1)
+            w1, w2 = load2(V, x, j) * ix - z1 * iz, load2(V, x, j + 1) * ix - z2 * iz
             dot += w1 * z1 + w2 * z2
-            store(w, j, w1)
-            store(w, j + 1, w2)
-        store(w, s, w0)
-        store(beta, i, b)
-        store(lam, s, b * (w0 * z0 + dot))
+            store2(V, SCALING, j, w1)
+            store2(V, SCALING, j + 1, w2)
+        store2(V, SCALING, s, w0)
+        store2(V, BETA, s, b)
+        store2(V, LAMBDA, s, b * (w0 * z0 + dot))
         t = dot / (1.0 + w0) + z0
         for j in range(s + 1, end, 2):
-            store(lam, j, b * (load(z, j) + t * load(w, j)))
-            store(lam, j + 1, b * (load(z, j + 1) + t * load(w, j + 1)))
+            store2(V, LAMBDA, j, b * (load2(V, z, j) + t * load2(V, SCALING, j)))
+            store2(V, LAMBDA, j + 1, b * (load2(V, z, j + 1) + t * load2(V, SCALING, j + 1)))
         s = end
 
 
 @kernel
-def apply(v, cones, w, beta, sign, out):  # type: ignore[no-untyped-def]
+def apply(V, cones, sign, v, out):  # type: ignore[no-untyped-def]
     """``W v`` (sign +1) or ``W⁻¹ v`` (sign −1)."""
     s = 0
     for i in range(cones.shape[0]):
         end = s + cones[i]
-        b, w0, v0, dot = load(beta, i), load(w, s), load(v, s), wide(0.0)
+        b, w0, v0, dot = load2(V, BETA, s), load2(V, SCALING, s), load2(V, v, s), wide(0.0)
         if sign < 0.0:
             b = 1.0 / b
         for j in range(s + 1, end, 2):
-            dot += load(w, j) * load(v, j) + load(w, j + 1) * load(v, j + 1)
+            dot += load2(V, SCALING, j) * load2(V, v, j) + load2(V, SCALING, j + 1) * load2(V, v, j + 1)
         t = dot / (1.0 + w0) + sign * v0
-        store(out, s, b * (w0 * v0 + sign * dot))
+        store2(V, out, s, b * (w0 * v0 + sign * dot))
         for j in range(s + 1, end, 2):
-            store(out, j, b * (load(v, j) + t * load(w, j)))
-            store(out, j + 1, b * (load(v, j + 1) + t * load(w, j + 1)))
+            store2(V, out, j, b * (load2(V, v, j) + t * load2(V, SCALING, j)))
+            store2(V, out, j + 1, b * (load2(V, v, j + 1) + t * load2(V, SCALING, j + 1)))
         s = end
 
 
 @kernel
-def apply_rows(A, cones, w, beta, out):  # type: ignore[no-untyped-def]
+def apply_rows(V, cones, A, out):  # type: ignore[no-untyped-def]
     """``W Aᵀ`` for a matrix by columns ``(n, rows, WIDTH)``: `apply` to each of its rows."""
     s = 0
     for i in range(cones.shape[0]):
         end = s + cones[i]
-        b, w0 = load(beta, i), load(w, s)
+        b, w0 = load2(V, BETA, s), load2(V, SCALING, s)
         share = 1.0 / (1.0 + w0)
         for r in range(A.shape[1]):
             v0, dot = load2(A, s, r), wide(0.0)
             for j in range(s + 1, end, 2):
-                dot += load(w, j) * load2(A, j, r) + load(w, j + 1) * load2(A, j + 1, r)
+                dot += load2(V, SCALING, j) * load2(A, j, r) + load2(V, SCALING, j + 1) * load2(A, j + 1, r)
             t = dot * share + v0
             store2(out, s, r, b * (w0 * v0 + dot))
             for j in range(s + 1, end, 2):
-                store2(out, j, r, b * (load2(A, j, r) + t * load(w, j)))
-                store2(out, j + 1, r, b * (load2(A, j + 1, r) + t * load(w, j + 1)))
+                store2(out, j, r, b * (load2(A, j, r) + t * load2(V, SCALING, j)))
+                store2(out, j + 1, r, b * (load2(A, j + 1, r) + t * load2(V, SCALING, j + 1)))
         s = end
 
 
 @kernel
-def quotient(lam, a, b, minus, cones, out):  # type: ignore[no-untyped-def]
+def quotient(V, cones, a, b, minus, out):  # type: ignore[no-untyped-def]
     """The u with ``λ ∘ u = a ∘ b − minus e`` in the Jordan algebra of each cone."""
     s = 0
     for i in range(cones.shape[0]):
         end = s + cones[i]
-        a0, b0, l0 = load(a, s), load(b, s), load(lam, s)
+        a0, b0, l0 = load2(V, a, s), load2(V, b, s), load2(V, LAMBDA, s)
         d0, square, dot = a0 * b0 - minus, wide(0.0), wide(0.0)
         for j in range(s + 1, end, 2):
-            a1, a2, b1, b2, l1, l2 = load(a, j), load(a, j + 1), load(b, j), load(b, j + 1), load(lam, j), load(lam, j + 1)  # fmt: skip
+            a1, a2, b1, b2, l1, l2 = load2(V, a, j), load2(V, a, j + 1), load2(V, b, j), load2(V, b, j + 1), load2(V, LAMBDA, j), load2(V, LAMBDA, j + 1)  # fmt: skip
             d1, d2 = a0 * b1 + b0 * a1, a0 * b2 + b0 * a2
             d0 += a1 * b1 + a2 * b2
             square += l1 * l1 + l2 * l2
             dot += l1 * d1 + l2 * d2
-            store(out, j, d1)
-            store(out, j + 1, d2)
+            store2(V, out, j, d1)
+            store2(V, out, j + 1, d2)
         norm = root(square)
         u0 = (l0 * d0 - dot) / larger((l0 - norm) * (l0 + norm), 1e-300)
         inverse = 1.0 / l0
-        store(out, s, u0)
+        store2(V, out, s, u0)
         for j in range(s + 1, end):
-            store(out, j, (load(out, j) - u0 * load(lam, j)) * inverse)
+            store2(V, out, j, (load2(V, out, j) - u0 * load2(V, LAMBDA, j)) * inverse)
         s = end
 
 
 @kernel
-def room(x, d, e, cones):  # type: ignore[no-untyped-def]
-    """The inverse of the largest α with ``x + α d`` and ``x + α e`` in the cones, at least 0."""
+def room(V, cones, d, e):  # type: ignore[no-untyped-def]
+    """The inverse of the largest α with ``λ + α d`` and ``λ + α e`` in the cones, at least 0."""
     worst, s = wide(0.0), 0
     for i in range(cones.shape[0]):
         end = s + cones[i]
-        x0, d0, e0 = load(x, s), load(d, s), load(e, s)
+        x0, d0, e0 = load2(V, LAMBDA, s), load2(V, d, s), load2(V, e, s)
         square, xd, xe = wide(0.0), wide(0.0), wide(0.0)
         for j in range(s + 1, end):
-            x1 = load(x, j)
+            x1 = load2(V, LAMBDA, j)
             square += x1 * x1
-            xd += x1 * load(d, j)
-            xe += x1 * load(e, j)
+            xd += x1 * load2(V, d, j)
+            xe += x1 * load2(V, e, j)
         norm = root(square)
         depth = root(larger((x0 - norm) * (x0 + norm), 1e-300))
         inverse, share = 1.0 / depth, 1.0 / (x0 + depth)
@@ -132,8 +136,8 @@ def room(x, d, e, cones):  # type: ignore[no-untyped-def]
         t, u = (d1 + d0) * share, (e1 + e0) * share
         dd, ee = wide(0.0), wide(0.0)
         for j in range(s + 1, end):
-            x1 = load(x, j)
-            v, q = load(d, j) - t * x1, load(e, j) - u * x1
+            x1 = load2(V, LAMBDA, j)
+            v, q = load2(V, d, j) - t * x1, load2(V, e, j) - u * x1
             dd += v * v
             ee += q * q
         worst = larger(worst, larger(root(dd) - d1, root(ee) - e1) * inverse)
@@ -142,22 +146,26 @@ def room(x, d, e, cones):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def quadratic(Q, cones, w, beta, W, L, A):  # type: ignore[no-untyped-def]
+def quadratic(V, cones, Q, W, L, A):  # type: ignore[no-untyped-def]
     """Factors ``L Lᵀ = 1 + W diag(Q) W`` of each cone's block, and ``L⁻¹`` applied to the columns' blocks of A."""
     s = 0
     for i in range(cones.shape[0]):
         k = cones[i]
-        b, w0 = load(beta, i), load(w, s)
+        b, w0 = load2(V, BETA, s), load2(V, SCALING, s)
         share = b / (1.0 + w0)
         for p in range(k):  # W of this cone, with the roots of Q
             for q in range(k):
-                v = load(w, s + p) * load(w, s + q) * share if p and q else b * load(w, s + p + q)
+                v = (
+                    load2(V, SCALING, s + p) * load2(V, SCALING, s + q) * share
+                    if p and q
+                    else b * load2(V, SCALING, s + p + q)
+                )
                 store2(W, p, q, v + b if p == q and p else v)
         for p in range(k):
             for q in range(p + 1):
                 t = wide(1.0 if p == q else 0.0)
                 for m in range(k):
-                    t += load2(W, p, m) * load2(W, m, q) * load(Q, s + m)
+                    t += load2(W, p, m) * load2(W, m, q) * load2(V, Q, s + m)
                 store2(L, s + p, q, t)
         factor(L, s, k)
         for r in range(A.shape[1]):
@@ -170,12 +178,12 @@ def quadratic(Q, cones, w, beta, W, L, A):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def triangular(L, cones, v, transposed):  # type: ignore[no-untyped-def]
+def triangular(V, cones, L, v, transposed):  # type: ignore[no-untyped-def]
     """``L⁻¹ v``, or ``L⁻ᵀ v``, block by block, in place."""
     s = 0
     for i in range(cones.shape[0]):
         if transposed:
-            backward(L, s, cones[i], v)
+            backward(L, s, cones[i], V, v)
         else:
-            forward(L, s, cones[i], v)
+            forward(L, s, cones[i], V, v)
         s += cones[i]

@@ -7,34 +7,33 @@ multiple of three, filled up with rows of zeros, which `factor` leaves out.
 from __future__ import annotations
 
 from ._jit import kernel
-from .wide import load, load2, root, store, store2, where, wide
+from .wide import load2, root, store2, where, wide
 
 
 @kernel
-def spread(A, y, out):  # type: ignore[no-untyped-def]
-    """``out = Aᵀ y``, one entry for each column."""
-    n, rows = A.shape[0], A.shape[1]
-    for r in range(0, rows, 3):
-        y0, y1, y2 = load(y, r), load(y, r + 1), load(y, r + 2)
-        for j in range(n):
-            before = wide(0.0) if r == 0 else load(out, j)
-            store(out, j, before + load2(A, j, r) * y0 + load2(A, j, r + 1) * y1 + load2(A, j, r + 2) * y2)
+def spread(A, rows, y, columns, out):  # type: ignore[no-untyped-def]
+    """``columns[out] = Aᵀ rows[y]``, one entry for each column."""
+    for r in range(0, A.shape[1], 3):
+        y0, y1, y2 = load2(rows, y, r), load2(rows, y, r + 1), load2(rows, y, r + 2)
+        for j in range(A.shape[0]):
+            before = wide(0.0) if r == 0 else load2(columns, out, j)
+            t = load2(A, j, r) * y0 + load2(A, j, r + 1) * y1 + load2(A, j, r + 2) * y2
+            store2(columns, out, j, before + t)
 
 
 @kernel
-def gather(A, x, out):  # type: ignore[no-untyped-def]
-    """``out = A x``, one entry for each row."""
-    n, rows = A.shape[0], A.shape[1]
-    for r in range(0, rows, 3):
+def gather(A, columns, x, rows, out):  # type: ignore[no-untyped-def]
+    """``rows[out] = A columns[x]``, one entry for each row."""
+    for r in range(0, A.shape[1], 3):
         t0, t1, t2 = wide(0.0), wide(0.0), wide(0.0)
-        for j in range(n):
-            v = load(x, j)
+        for j in range(A.shape[0]):
+            v = load2(columns, x, j)
             t0 += load2(A, j, r) * v
             t1 += load2(A, j, r + 1) * v
             t2 += load2(A, j, r + 2) * v
-        store(out, r, t0)
-        store(out, r + 1, t1)
-        store(out, r + 2, t2)
+        store2(rows, out, r, t0)
+        store2(rows, out, r + 1, t1)
+        store2(rows, out, r + 2, t2)
 
 
 @kernel
@@ -91,21 +90,21 @@ def factor(S, at, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def forward(S, at, n, v):  # type: ignore[no-untyped-def]
-    """``L⁻¹ v`` in place, for the n entries from *at* on."""
+def forward(S, at, n, v, k):  # type: ignore[no-untyped-def]
+    """``L⁻¹ v[k]`` in place, for the n entries from *at* on."""
     for j in range(n):
-        t = load(v, at + j)
+        t = load2(v, k, at + j)
         for m in range(j):
-            t -= load2(S, at + j, m) * load(v, at + m)
-        store(v, at + j, t * load2(S, at + j, j))
+            t -= load2(S, at + j, m) * load2(v, k, at + m)
+        store2(v, k, at + j, t * load2(S, at + j, j))
 
 
 @kernel
-def backward(S, at, n, v):  # type: ignore[no-untyped-def]
-    """``L⁻ᵀ v`` in place, for the n entries from *at* on."""
+def backward(S, at, n, v, k):  # type: ignore[no-untyped-def]
+    """``L⁻ᵀ v[k]`` in place, for the n entries from *at* on."""
     for back in range(n):
         j = n - 1 - back
-        t = load(v, at + j)
+        t = load2(v, k, at + j)
         for m in range(j + 1, n):
-            t -= load2(S, at + m, j) * load(v, at + m)
-        store(v, at + j, t * load2(S, at + j, j))
+            t -= load2(S, at + m, j) * load2(v, k, at + m)
+        store2(v, k, at + j, t * load2(S, at + j, j))
