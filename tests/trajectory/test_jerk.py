@@ -53,10 +53,31 @@ def test_double_s_is_the_optimum_on_a_line() -> None:
             assert tj.state_to_state(0.0, g["distance"], limits).duration == pytest.approx(
                 case["expected"]["duration"], rel=1e-9
             )
-    limits = tj.Limits(1.0, 2.0, 8.0)  # all seven phases
-    along = tj.jerk_limited(tj.polyline([[0.0], [2.0]]), limits)
-    assert along.check(limits).success
-    assert along.duration == pytest.approx(tj.state_to_state(0.0, 2.0, limits).duration, rel=1e-2)
+            along = tj.jerk_limited(tj.polyline([[0.0], [g["distance"]]]), limits)
+            assert along.duration == pytest.approx(case["expected"]["duration"], rel=1e-9)
+
+
+def test_straight_lines_in_many_coordinates_are_exact() -> None:
+    rng = np.random.default_rng(2)
+    q0, q1 = rng.normal(size=(2, 5))
+    limits = tj.Limits(rng.uniform(0.5, 2.0, 5), rng.uniform(1.0, 4.0, 5), rng.uniform(5.0, 20.0, 5))
+    line = tj.jerk_limited(tj.polyline([q0, 0.3 * q0 + 0.7 * q1, q1]), limits)
+    assert line.check(limits).success
+    assert line.duration == pytest.approx(tj.state_to_state(q0, q1, limits, synchronization="phase").duration, rel=1e-9)
+    np.testing.assert_allclose(line([0.0, line.duration]), [q0, q1], atol=1e-12)
+    # one that bends a little takes little longer: the search along curves is near the optimum there
+    bent = tj.Spline([q0, 0.5 * (q0 + q1) + 1e-3, q1])
+    assert tj.jerk_limited(bent, limits, trials=20).duration < 1.06 * line.duration
+
+
+def test_a_line_driven_forth_and_back_is_no_straight_line() -> None:
+    limits = tj.Limits(1.0, 2.0, 8.0)
+    there = tj.Spline([[0.0], [1.5], [1.0]], [0.0, 1.0, 2.0])
+    motion = tj.jerk_limited(there, limits, trials=10)
+    assert motion.check(limits).success
+    assert float(motion.extrema(0).upper[0]) > 1.4
+    with pytest.raises(InputError, match="acceleration is infinite along the line"):
+        tj.jerk_limited(tj.polyline([[0.0], [1.0]]), tj.Limits(velocity=1.0, jerk=1.0))
 
 
 def test_jerk_limited_along_a_path() -> None:

@@ -45,21 +45,29 @@ def evaluate(breaks, coefficients, x, order, out):
 
 
 @kernel
-def to_bernstein(power, h, out):
-    """Bernstein coefficients on [0, h] of the polynomial with low-first coefficients *power*."""
+def to_bernstein(power, h, binomial, out):
+    """Bernstein coefficients on [0, h] of the polynomial with low-first coefficients *power*; ``binomial (m,)``: of its
+    degree."""
     degree = power.shape[0] - 1
     scale = 1.0
     for k in range(degree + 1):
-        out[k] = power[k] * scale
+        out[k] = power[k] * scale / binomial[k]
         scale *= h
-        # divide by the binomial (degree choose k)
-        c = 1.0
-        for m in range(k):
-            c = c * (degree - m) / (m + 1)
-        out[k] /= c
     for level in range(1, degree + 1):
         for k in range(degree, level - 1, -1):
             out[k] += out[k - 1]
+
+
+@kernel
+def _derivative(coefficients, k, j, order, sign, power):
+    """Low-first coefficients of ``sign × derivative`` of coordinate j on piece k."""
+    for p in range(power.shape[0]):
+        power[p] = 0.0
+        if p + order < coefficients.shape[1]:
+            factor = sign
+            for q in range(order):
+                factor *= p + order - q
+            power[p] = factor * coefficients[k, p + order, j]
 
 
 @kernel
@@ -80,7 +88,7 @@ def upper_bound(breaks, coefficients, order, sign, tolerance, bound, where):
     """Proven maximum of ``sign × derivative`` per coordinate, within *tolerance*, and where it is attained.
 
     Branch and bound over Bernstein pieces: ``bound (n,)`` is never below the true maximum, and at most *tolerance*
-    (relative to 1 + |maximum|) above a value that is attained at ``where (n,)``.
+    (relative to the largest magnitude at any break, and to the maximum) above a value attained at ``where (n,)``.
     """
     pieces = coefficients.shape[0]
     n = coefficients.shape[2]
@@ -91,66 +99,68 @@ def upper_bound(breaks, coefficients, order, sign, tolerance, bound, where):
     left = np.empty(m)
     right = np.empty(m)
     b = np.empty(m)
+    binomial = np.ones(m)
+    for p in range(1, m):
+        binomial[p] = binomial[p - 1] * (m - p) / p
     for j in range(n):
         attained = -np.inf
         proven = -np.inf
+        size = 0.0
         place = breaks[0]
         # ends of all pieces first: a good incumbent prunes nearly everything
-        for phase in range(2):
-            for k in range(pieces):
-                h = breaks[k + 1] - breaks[k]
+        for k in range(pieces):
+            h = breaks[k + 1] - breaks[k]
+            _derivative(coefficients, k, j, order, sign, power)
+            end = 0.0
+            for p in range(m - 1, -1, -1):
+                end = end * h + power[p]
+            size = max(size, max(abs(power[0]), abs(end)))
+            if power[0] > attained:
+                attained = power[0]
+                place = breaks[k]
+            if end > attained:
+                attained = end
+                place = breaks[k + 1]
+        for k in range(pieces):
+            h = breaks[k + 1] - breaks[k]
+            _derivative(coefficients, k, j, order, sign, power)
+            to_bernstein(power, h, binomial, b)
+            depth = 1
+            for p in range(m):
+                stack[0, p] = b[p]
+            span[0, 0] = breaks[k]
+            span[0, 1] = breaks[k + 1]
+            while depth > 0:
+                depth -= 1
                 for p in range(m):
-                    power[p] = 0.0
-                    if p + order < coefficients.shape[1]:
-                        factor = sign
-                        for q in range(order):
-                            factor *= p + order - q
-                        power[p] = factor * coefficients[k, p + order, j]
-                to_bernstein(power, h, b)
-                if phase == 0:
-                    if b[0] > attained:
-                        attained = b[0]
-                        place = breaks[k]
-                    if b[m - 1] > attained:
-                        attained = b[m - 1]
-                        place = breaks[k + 1]
+                    b[p] = stack[depth, p]
+                lo = span[depth, 0]
+                hi = span[depth, 1]
+                top = b[0]
+                for p in range(1, m):
+                    if b[p] > top:
+                        top = b[p]
+                if b[0] > attained:
+                    attained = b[0]
+                    place = lo
+                if b[m - 1] > attained:
+                    attained = b[m - 1]
+                    place = hi
+                slack = tolerance * max(size, abs(attained))
+                if top <= attained + slack or depth >= 60 or hi - lo <= 1e-14 * (1.0 + abs(hi)):
+                    if top > proven:
+                        proven = top
                     continue
-                depth = 1
+                _split(b, left, right)
+                mid = 0.5 * (lo + hi)
                 for p in range(m):
-                    stack[0, p] = b[p]
-                span[0, 0] = breaks[k]
-                span[0, 1] = breaks[k + 1]
-                while depth > 0:
-                    depth -= 1
-                    for p in range(m):
-                        b[p] = stack[depth, p]
-                    lo = span[depth, 0]
-                    hi = span[depth, 1]
-                    top = b[0]
-                    for p in range(1, m):
-                        if b[p] > top:
-                            top = b[p]
-                    if b[0] > attained:
-                        attained = b[0]
-                        place = lo
-                    if b[m - 1] > attained:
-                        attained = b[m - 1]
-                        place = hi
-                    slack = tolerance * (1.0 + abs(attained))
-                    if top <= attained + slack or depth >= 60 or hi - lo <= 1e-14 * (1.0 + abs(hi)):
-                        if top > proven:
-                            proven = top
-                        continue
-                    _split(b, left, right)
-                    mid = 0.5 * (lo + hi)
-                    for p in range(m):
-                        stack[depth, p] = left[p]
-                        stack[depth + 1, p] = right[p]
-                    span[depth, 0] = lo
-                    span[depth, 1] = mid
-                    span[depth + 1, 0] = mid
-                    span[depth + 1, 1] = hi
-                    depth += 2
+                    stack[depth, p] = left[p]
+                    stack[depth + 1, p] = right[p]
+                span[depth, 0] = lo
+                span[depth, 1] = mid
+                span[depth + 1, 0] = mid
+                span[depth + 1, 1] = hi
+                depth += 2
         bound[j] = max(proven, attained)
         where[j] = place
 

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..kernels import path as kernels
 
 RANGE_TOLERANCE = 1e-12
-"""Largest gap, relative to 1 + |value|, between a proven extremum and a value that is attained."""
+"""Largest gap, relative to the largest magnitude, between a proven extremum and a value that is attained."""
 
 
 @dataclass(frozen=True)
@@ -94,12 +94,15 @@ class Piecewise:
         kernels.evaluate(self.breaks, self.coefficients, np.clip(flat, start, end), order, out)
         return out.reshape(*values.shape, self.n)
 
-    def extrema(self, order: int = 0) -> Extrema:
-        """Proven range of the derivative *order* over the whole interval (Bernstein coefficients, subdivided)."""
+    def extrema(self, order: int = 0, tolerance: float = RANGE_TOLERANCE) -> Extrema:
+        """Proven range of the derivative *order* over the whole interval (Bernstein coefficients, subdivided).
+
+        It is attained within *tolerance*, relative to the largest magnitude.
+        """
         order = check_order(order)
         upper, at_upper, lower, at_lower = (np.empty(self.n) for _ in range(4))
-        kernels.upper_bound(self.breaks, self.coefficients, order, 1.0, RANGE_TOLERANCE, upper, at_upper)
-        kernels.upper_bound(self.breaks, self.coefficients, order, -1.0, RANGE_TOLERANCE, lower, at_lower)
+        kernels.upper_bound(self.breaks, self.coefficients, order, 1.0, tolerance, upper, at_upper)
+        kernels.upper_bound(self.breaks, self.coefficients, order, -1.0, tolerance, lower, at_lower)
         return Extrema(-lower, upper, at_lower, at_upper)
 
     def jumps(self, order: int) -> Array:
