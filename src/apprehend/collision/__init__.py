@@ -4,7 +4,7 @@ from .allowed import AllowedPairs, find_allowed_pairs
 from .model import Closest, CollisionModel, PairDistances, Sweep, Touch
 from .obstacles import Cloud, Grid, HalfSpace, Union
 from .pairs import Separation, signed_distance
-from .scene import Box, Placed, RobotSource, Scene
+from .scene import Box, Obstacle, Placed, RobotSource, Scene
 from .shapes import Convex
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "Convex",
     "Grid",
     "HalfSpace",
+    "Obstacle",
     "PairDistances",
     "Placed",
     "RobotSource",

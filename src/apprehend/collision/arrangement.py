@@ -72,6 +72,8 @@ class Arrangement:
         self._compiled: CollideModel | None = None
         self._lanes: SphereModel | None = None
         self.reasons = {**self.reasons, **self._checked_pairs(allowed)}
+        for a, b in scene.allowed if scene is not None else ():
+            self.reasons = {**self.reasons, pair(a, b): "allowed by the scene"}
 
     # --- what may touch ------------------------------------------------------------------------------------------
     def _checked_pairs(self, pairs: Iterable[tuple[str, str]]) -> dict[Pair, str]:
@@ -254,7 +256,7 @@ def _shapes_of(body: Body | Geometry | Sequence[Geometry], name: str | None) -> 
 
 
 def obstacle_nodes(scene: Scene | None) -> tuple[Node, ...]:
-    """Boxes and bodies of a scene as fixed nodes."""
+    """Boxes, bodies and obstacles of a scene as fixed nodes."""
     if scene is None:
         return ()
     boxes = tuple(Node(box.name, -1, (Convex.box(box.size).at(box.pose),)) for box in scene.boxes)
@@ -262,4 +264,4 @@ def obstacle_nodes(scene: Scene | None) -> tuple[Node, ...]:
         Node(name, -1, tuple(shape.at(placed.pose) for shape in as_geometry(placed.body, name)))
         for name, placed in scene.bodies.items()
     )
-    return boxes + bodies
+    return boxes + bodies + tuple(Node(name, -1, other.shapes) for name, other in scene.obstacles.items())

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,8 @@ from ..conventions import GRAVITY
 from ..errors import InputError, unknown_name
 from ..kinematics import Robot
 from ..robots.description import Description, JointType
+from .geometry import Geometry
+from .obstacles import as_geometry
 
 if TYPE_CHECKING:
     from ..bodies import Body
@@ -40,10 +42,16 @@ class RobotSource:
     mount: Array = field(default_factory=lambda: np.eye(4))  # T_at_handroot
     base: Array = field(default_factory=lambda: np.eye(4))  # T_world_base
     prefix: str | None = None  # before the names of the hand; None: "" where no name occurs twice, else "hand_"
+    within: str | None = None  # *arm* is a MuJoCo model of a whole scene; this body of it, or "": the one that moves
 
     def build(self) -> tuple[Robot, str | None]:
         """The placed robot with its hand, and the name of the hand's root link (None: no hand was attached)."""
-        arm = Robot.load(self.arm)
+        if self.within is None:
+            arm = Robot.load(self.arm)
+        else:
+            from ..robots import read_world
+
+            arm = Robot(read_world(self.arm, self.within or None).description)
         if self.hand is None:
             return arm.placed(self.base), None
         hand = Robot.load(self.hand)
@@ -85,6 +93,28 @@ class Box:
 
 
 @dataclass(frozen=True, eq=False)
+class Obstacle:
+    """Something fixed of any geometry, in the world: a floor, a pillar, what a camera saw.
+
+    *origin* remembers what the scene file said, for saving. Make one with `of`.
+    """
+
+    name: str
+    shapes: tuple[Geometry, ...]  # at their poses in the world
+    rgba: tuple[float, float, float, float] = (0.62, 0.58, 0.52, 1.0)
+    friction: float = 0.8
+    origin: Mapping[str, object] | None = None
+
+    @staticmethod
+    def of(name: str, thing: object, pose: ArrayLike | None = None, **options: Any) -> Obstacle:
+        """*thing* (geometry, several of it, a body, a distance field) at *pose* (T_world_thing)."""
+        if not name:
+            raise InputError("an obstacle needs a name")
+        T = np.eye(4) if pose is None else _one_pose(pose, f"the pose of obstacle {name!r}")
+        return Obstacle(name, tuple(shape.at(T) for shape in as_geometry(thing, name)), **options)
+
+
+@dataclass(frozen=True, eq=False)
 class Placed:
     """A body at a pose; *origin* remembers what the scene file said (``{"mesh": "mug.obj"}``), for saving."""
 
@@ -107,6 +137,8 @@ class Scene:
     upright: bool = False  # the picked body must stay upright on its way
     clearance: float = 0.0  # m that must stay between the robot and anything that it does not mean to touch
     gravity: float = GRAVITY  # m/s², along −z of the world
+    obstacles: Mapping[str, Obstacle] = field(default_factory=dict)
+    allowed: tuple[tuple[str, str], ...] = ()  # pairs of links, bodies, boxes and obstacles that may touch
     hand_root: str | None = None  # root link of an attached hand; None: the hand is part of the arm's description
     source: Path | None = None
 
@@ -115,17 +147,24 @@ class Scene:
             raise InputError(f"the clearance of a scene is {self.clearance} m; expected 0 or more")
         if not np.isfinite(self.gravity):
             raise InputError(f"gravity is {self.gravity} m/s²; expected a finite number")
-        names = [box.name for box in self.boxes] + list(self.bodies)
+        names = [box.name for box in self.boxes] + list(self.bodies) + list(self.obstacles)
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise InputError(f"{twice[0]!r} names two things in one scene; every box and body needs a name of its own")
+            raise InputError(f"{twice[0]!r} names two things in one scene; every thing in it needs a name of its own")
         for name in (*self.goals, *([] if self.pick is None else [self.pick])):
             if name not in self.bodies:
                 unknown_name("body", name, self.bodies, "the scene")
+        known = {*names, *self.robot.frame_names}
+        for one, other in self.allowed:
+            for name in (one, other):
+                if name not in known:
+                    unknown_name("link, body, box or obstacle", name, known, "the scene (in its allowed pairs)")
         bodies = {n: replace(p, pose=_one_pose(p.pose, f"the pose of body {n!r}")) for n, p in self.bodies.items()}
         goals = {n: _one_pose(T, f"the goal of body {n!r}") for n, T in self.goals.items()}
         object.__setattr__(self, "bodies", MappingProxyType(bodies))
         object.__setattr__(self, "goals", MappingProxyType(goals))
+        object.__setattr__(self, "obstacles", MappingProxyType(dict(self.obstacles)))
+        object.__setattr__(self, "allowed", tuple((str(a), str(b)) for a, b in self.allowed))
 
     # --- changes, each a new scene -------------------------------------------------------------------------------
     def moved(self, name: str, pose: ArrayLike) -> Scene:
@@ -138,20 +177,33 @@ class Scene:
         return replace(self, bodies={**self.bodies, name: Placed(body, as_pose(pose, f"pose of {name!r}"), movable)})
 
     def without(self, name: str) -> Scene:
-        """The scene without the body or box *name*, its goal and its task."""
+        """The scene without the body, box or obstacle *name*, its goal, its task and its allowed pairs."""
+        allowed = tuple(p for p in self.allowed if name not in p)
+        if name in self.obstacles:
+            left = {n: o for n, o in self.obstacles.items() if n != name}
+            return replace(self, obstacles=left, allowed=allowed)
         if name in self.bodies:
             return replace(
                 self,
+                allowed=allowed,
                 bodies={n: p for n, p in self.bodies.items() if n != name},
                 goals={n: T for n, T in self.goals.items() if n != name},
                 pick=None if self.pick == name else self.pick,
             )
         self.box(name)
-        return replace(self, boxes=tuple(box for box in self.boxes if box.name != name))
+        return replace(self, boxes=tuple(box for box in self.boxes if box.name != name), allowed=allowed)
 
     def with_box(self, box: Box) -> Scene:
         """The scene with one more fixed box."""
         return replace(self, boxes=(*self.boxes, box))
+
+    def with_obstacle(self, name: str, thing: object, pose: ArrayLike | None = None) -> Scene:
+        """The scene with one more fixed obstacle (or another one of that name) of any geometry; see `Obstacle.of`."""
+        return replace(self, obstacles={**self.obstacles, name: Obstacle.of(name, thing, pose)})
+
+    def allowing(self, *pairs: tuple[str, str]) -> Scene:
+        """The scene in which these pairs of names may touch, too."""
+        return replace(self, allowed=(*self.allowed, *pairs))
 
     def with_task(self, pick: str, place: ArrayLike, *, upright: bool = False) -> Scene:
         """The scene with the task of bringing body *pick* to pose *place* (4, 4)."""
@@ -191,6 +243,13 @@ class Scene:
         from .scene_file import save
 
         return save(self, Path(path))
+
+    @staticmethod
+    def from_mujoco(source: object, *, robot: str | None = None) -> Scene:
+        """The scene of a MuJoCo model: an MJCF file's path, or an ``mjModel``; see `mujoco_scene.from_mujoco`."""
+        from .mujoco_scene import from_mujoco
+
+        return from_mujoco(source, robot=robot)
 
     @staticmethod
     def tabletop(

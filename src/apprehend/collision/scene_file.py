@@ -4,6 +4,8 @@
 
     clearance = 0.005                       # m, optional
     gravity = 9.81                          # m/s², optional
+    allowed = [["table", "base_link"]]      # pairs of links, bodies, boxes and obstacles that may touch; optional
+    srdf = "robot.srdf"                     # more such pairs of links; optional
 
     [robot]
     arm = "ur5e"                            # catalogue name, or a path beside this file
@@ -23,6 +25,11 @@
     mass = 0.3                              # kg; or density in kg/m³
     pose = {xyz = [0.5, -0.2, 0.05], rpy_deg = [0, 0, 30]}
     # or: rest = {on = "table", xy = [0.5, -0.2], yaw_deg = 30}      choose = 0: the most probable stable pose
+
+    [[obstacle]]                            # fixed, of any geometry; any number: see `obstacle_tables`
+    name = "floor"
+    half_space = [0, 0, 1]
+    pose = {xyz = [0, 0, -0.75]}
 
     [task]
     pick = "mug"
@@ -44,109 +51,29 @@ import numpy as np
 
 from ..arrays import Array
 from ..conventions import DEGREE, GRAVITY
-from ..errors import ApprehendError, DescriptionError, suggestion
+from ..errors import ApprehendError, DescriptionError, InputError, suggestion
 from ..files import replace_file
-from .rotations import matrix_quaternion, quaternion_matrix, rpy_matrix
+from . import obstacle_tables
+from .allowed import srdf_pairs
 from .scene import Box, Placed, RobotSource, Scene
+from .table import Table, pose_text, quoted
 from .tabletop import resting
 
 if TYPE_CHECKING:
     from ..bodies import Body
+    from ..kinematics import Robot
 
 SIZE_LIMIT = 1_000_000
 """Largest scene file in bytes."""
 
-TOP = ("robot", "box", "body", "goal", "task", "clearance", "gravity")
-ROBOT = ("arm", "hand", "at", "mount", "base", "prefix")
+TOP = ("robot", "box", "body", "obstacle", "goal", "task", "clearance", "gravity", "allowed", "srdf")
+ROBOT = ("arm", "hand", "at", "mount", "base", "prefix", "within")
 BOX = ("name", "size", "pose", "rgba", "friction")
 SHAPES = ("mesh", "household", "box", "cylinder", "sphere")
 BODY = ("name", *SHAPES, "units", "mass", "density", "friction", "pose", "rest", "movable")
 REST = ("on", "xy", "yaw_deg", "choose")
 TASK = ("pick", "place", "upright")
 GOAL = ("body", "pose")
-POSE = ("xyz", "rpy", "rpy_deg", "wxyz")
-
-
-class Table:
-    """One table of the file with its place, so that every message can say where it stood."""
-
-    def __init__(self, values: object, where: str, allowed: tuple[str, ...]):
-        if not isinstance(values, Mapping):
-            raise DescriptionError(f"{where} is {values!r}; expected a table with the keys {', '.join(allowed)}")
-        for key in values:
-            if key not in allowed:
-                hint = suggestion(key, allowed) or f" Known keys: {', '.join(allowed)}."
-                raise DescriptionError(f"{where} has an unknown key {key!r}.{hint}")
-        self.values: Mapping[str, Any] = values
-        self.where = where
-
-    def __contains__(self, key: str) -> bool:
-        return key in self.values
-
-    def error(self, key: str, expected: str) -> DescriptionError:
-        """The error for a key whose value is not what is *expected*."""
-        return DescriptionError(f"{self.where}: {key} is {self.values.get(key)!r}; expected {expected}")
-
-    def text(self, key: str, default: str | None = None) -> str | None:
-        """A string."""
-        if key not in self.values:
-            return default
-        if not isinstance(self.values[key], str) or not self.values[key]:
-            raise self.error(key, "a text in quotes")
-        return str(self.values[key])
-
-    def need_text(self, key: str) -> str:
-        """A string that must be there."""
-        value = self.text(key)
-        if value is None:
-            raise DescriptionError(f"{self.where} has no {key!r}; it needs one")
-        return value
-
-    def number(self, key: str, default: float, *, at_least: float = -np.inf) -> float:
-        """A finite number."""
-        if key not in self.values:
-            return default
-        value = self.values[key]
-        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value) or value < at_least:
-            raise self.error(key, "a finite number" + (f", {at_least:g} or more" if np.isfinite(at_least) else ""))
-        return float(value)
-
-    def flag(self, key: str, default: bool) -> bool:
-        """true or false."""
-        value = self.values.get(key, default)
-        if not isinstance(value, bool):
-            raise self.error(key, "true or false")
-        return value
-
-    def numbers(self, key: str, count: int) -> Array:
-        """A list of *count* finite numbers that must be there."""
-        value = self.values.get(key)
-        good = isinstance(value, list) and len(value) == count
-        if not good or any(
-            isinstance(v, bool) or not isinstance(v, int | float) or not np.isfinite(v) for v in value or []
-        ):
-            raise self.error(key, f"a list of {count} finite numbers")
-        return np.array(value, dtype=np.float64)
-
-    def pose(self, key: str) -> Array:
-        """A pose that must be there: ``{xyz, rpy_deg | rpy | wxyz}``."""
-        if key not in self.values:
-            raise DescriptionError(f"{self.where} has no {key!r}; expected a pose such as {{xyz = [0.5, 0, 0.1]}}")
-        table = Table(self.values[key], f"{self.where}, {key}", POSE)
-        turns = [k for k in POSE[1:] if k in table]
-        if len(turns) > 1:
-            raise DescriptionError(f"{table.where} has both {turns[0]} and {turns[1]}; give one rotation")
-        T = np.eye(4)
-        if "wxyz" in table:
-            quaternion = table.numbers("wxyz", 4)
-            norm = float(np.linalg.norm(quaternion))
-            if abs(norm - 1.0) > 1e-3:
-                raise DescriptionError(f"{table.where}: wxyz has length {norm:.4g}; a rotation is a unit quaternion")
-            T[:3, :3] = quaternion_matrix(quaternion / norm)
-        elif turns:
-            T[:3, :3] = rpy_matrix(table.numbers(turns[0], 3) * (DEGREE if turns[0] == "rpy_deg" else 1.0))
-        T[:3, 3] = table.numbers("xyz", 3) if "xyz" in table else 0.0
-        return T
 
 
 def load(path: Path) -> Scene:
@@ -178,6 +105,12 @@ def load(path: Path) -> Scene:
             )
     bodies = {p.body.name: p for p in placed}
     goals, pick, upright = _task(data, where, bodies)
+    obstacles = {}
+    for table in _tables(data, "obstacle", where, obstacle_tables.OBSTACLE):
+        obstacle = _at(table.where, obstacle_tables.read, table, path.parent)
+        if obstacle.name in obstacles:
+            raise DescriptionError(f"{table.where}: {obstacle.name!r} is the name of another obstacle; choose another")
+        obstacles[obstacle.name] = obstacle
     robot, hand_root = _at(f"{where}, [robot]", source.build)
     scene: Scene = _at(
         where,
@@ -191,10 +124,25 @@ def load(path: Path) -> Scene:
         upright=upright,
         clearance=top.number("clearance", 0.0, at_least=0.0),
         gravity=top.number("gravity", GRAVITY),
+        obstacles=obstacles,
+        allowed=_allowed(top, path.parent, robot),
         hand_root=hand_root,
         source=path,
     )
     return scene
+
+
+def _allowed(top: Table, folder: Path, robot: Robot) -> tuple[tuple[str, str], ...]:
+    """Pairs that may touch: those of the file, and of an SRDF beside it."""
+    pairs = top.values.get("allowed", [])
+    if not isinstance(pairs, list) or any(
+        not isinstance(p, list) or len(p) != 2 or not all(isinstance(name, str) for name in p) for p in pairs
+    ):
+        raise top.error("allowed", 'a list of pairs of names, such as [["table", "base_link"]]')
+    found = [(str(a), str(b)) for a, b in pairs]
+    if "srdf" in top:
+        found += [(a, b) for a, b in sorted(sorted(p) for p in srdf_pairs(folder / top.need_text("srdf"), robot))]
+    return tuple(found)
 
 
 def _at(where: str, call: Any, *args: Any, **options: Any) -> Any:
@@ -232,7 +180,12 @@ def _robot(table: Table, folder: Path) -> RobotSource:
         mount=table.pose("mount") if "mount" in table else np.eye(4),
         base=table.pose("base") if "base" in table else np.eye(4),
         prefix=prefix,
+        within=_text_or_empty(table, "within"),
     )
+
+
+def _text_or_empty(table: Table, key: str) -> str | None:
+    return "" if table.values.get(key) == "" else table.text(key)
 
 
 def _box(table: Table) -> Box:
@@ -332,31 +285,44 @@ def _task(
     return goals, pick, task.flag("upright", False)
 
 
+def _allowed_lines(allowed: tuple[tuple[str, str], ...]) -> list[str]:
+    pairs = ", ".join(f"[{quoted(a)}, {quoted(b)}]" for a, b in allowed)
+    return [f"allowed = [{pairs}]"] if pairs else []
+
+
 # --- writing -------------------------------------------------------------------------------------------------------
 def save(scene: Scene, path: Path) -> Path:
     """Write *scene* to *path* (whole or not at all); bodies without an origin go into meshes beside it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     source = scene.robot_source
+    if source.within is not None and not Path(source.arm).is_file():
+        raise InputError("the robot of this scene was read from a model in memory; save that model and read the file")
     lines = [
         f"clearance = {scene.clearance!r}",
         f"gravity = {scene.gravity!r}",
+        *(
+            [f"allowed = [{', '.join(f'[{quoted(a)}, {quoted(b)}]' for a, b in scene.allowed)}]"]
+            if scene.allowed
+            else []
+        ),
         "",
         "[robot]",
-        f"arm = {_quoted(source.arm)}",
+        f"arm = {quoted(source.arm)}",
     ]
+    lines += [f"within = {quoted(source.within)}"] * (source.within is not None)
     if source.hand is not None:
-        lines.append(f"hand = {_quoted(source.hand)}")
-        lines += [f"at = {_quoted(source.at)}"] * (source.at is not None)
-        lines += [f"prefix = {_quoted(source.prefix)}"] * (source.prefix is not None)
-        lines.append(f"mount = {_pose_text(source.mount)}")
-    lines.append(f"base = {_pose_text(source.base)}")
+        lines.append(f"hand = {quoted(source.hand)}")
+        lines += [f"at = {quoted(source.at)}"] * (source.at is not None)
+        lines += [f"prefix = {quoted(source.prefix)}"] * (source.prefix is not None)
+        lines.append(f"mount = {pose_text(source.mount)}")
+    lines.append(f"base = {pose_text(source.base)}")
     for box in scene.boxes:
         lines += [
             "",
             "[[box]]",
-            f"name = {_quoted(box.name)}",
+            f"name = {quoted(box.name)}",
             f"size = {box.size.tolist()}",
-            f"pose = {_pose_text(box.pose)}",
+            f"pose = {pose_text(box.pose)}",
         ]
         lines += [f"rgba = {[float(c) for c in box.rgba]}", f"friction = {box.friction!r}"]
     for name, placed in scene.bodies.items():
@@ -365,35 +331,28 @@ def save(scene: Scene, path: Path) -> Path:
             mesh = path.parent / f"{path.stem}_{name}.obj"
             body.save(mesh)
             origin = {"mesh": str(mesh)}
-        lines += ["", "[[body]]", f"name = {_quoted(name)}"]
+        lines += ["", "[[body]]", f"name = {quoted(name)}"]
         for key, value in origin.items():
             if key == "mesh" and Path(str(value)).is_relative_to(path.parent.resolve()):
                 value = Path(str(value)).relative_to(path.parent.resolve()).as_posix()
             elif key == "mesh" and Path(str(value)).parent == path.parent:
                 value = Path(str(value)).name
-            lines.append(f"{key} = {_quoted(value) if isinstance(value, str) else value}")
+            lines.append(f"{key} = {quoted(value) if isinstance(value, str) else value}")
         lines += [
             f"mass = {float(body.mass)!r}",
             f"friction = {float(body.friction)!r}",
-            f"pose = {_pose_text(placed.pose)}",
+            f"pose = {pose_text(placed.pose)}",
         ]
         lines += ["movable = false"] * (not placed.movable)
+    for obstacle in scene.obstacles.values():
+        lines += obstacle_tables.lines(obstacle, path)
     for name, goal in scene.goals.items():
         if name != scene.pick:
-            lines += ["", "[[goal]]", f"body = {_quoted(name)}", f"pose = {_pose_text(goal)}"]
+            lines += ["", "[[goal]]", f"body = {quoted(name)}", f"pose = {pose_text(goal)}"]
     if scene.pick is not None:
-        lines += ["", "[task]", f"pick = {_quoted(scene.pick)}", f"upright = {str(scene.upright).lower()}"]
+        lines += ["", "[task]", f"pick = {quoted(scene.pick)}", f"upright = {str(scene.upright).lower()}"]
         if scene.pick in scene.goals:
-            lines.append(f"place = {_pose_text(scene.goals[scene.pick])}")
+            lines.append(f"place = {pose_text(scene.goals[scene.pick])}")
     with replace_file(path) as work:
         work.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
-
-
-def _quoted(text: object) -> str:
-    escaped = str(text).replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
-
-
-def _pose_text(T: Array) -> str:
-    return f"{{xyz = {T[:3, 3].tolist()}, wxyz = {matrix_quaternion(T[:3, :3]).tolist()}}}"

@@ -27,6 +27,7 @@ from .export import save_dh, save_mjcf, save_urdf
 from .load import load_description
 from .meshes import link_surface, load_shape_mesh, read_mesh, shape_surface
 from .mjcf import read_mjcf
+from .mjcf_world import FixedThing, FreeBody, World, read_world
 from .outline import outline
 from .srdf import Semantics, parse_srdf, read_srdf
 from .table_files import read_dh, read_table
@@ -37,6 +38,8 @@ __all__ = [
     "DHChain",
     "Description",
     "Inertial",
+    "FixedThing",
+    "FreeBody",
     "Joint",
     "JointLimits",
     "JointType",
@@ -48,6 +51,7 @@ __all__ = [
     "Shape",
     "ShapeKind",
     "Tendon",
+    "World",
     "attach",
     "catalogue",
     "link_surface",
@@ -62,6 +66,7 @@ __all__ = [
     "read_srdf",
     "read_table",
     "read_urdf",
+    "read_world",
     "renamed",
     "save_dh",
     "save_mjcf",

@@ -50,9 +50,20 @@ def read_mjcf(
     ``"ignore"`` missing ones (reported). *loops* (equalities that close a chain): ``"refuse"``, or ``"cut"`` them and
     list them in `Description.loops`. Raises `DescriptionError` or `MeshError`.
     """
-    choice(meshes, "meshes", ("require", "ignore"))
     choice(loops, "loops", ("refuse", "cut"))
     path = Path(path)
+    model, repairs, name = _compile(path, packages, meshes)
+    return _Compiled(model, path, repairs, loops).read(name)
+
+
+def compiled_file(path: Path) -> tuple[Any, list[Repair]]:
+    """The compiled model of an MJCF file, and what had to be repaired."""
+    model, repairs, _ = _compile(path, None, "require")
+    return model, repairs
+
+
+def _compile(path: Path, packages: Packages, meshes: str) -> tuple[Any, list[Repair], str]:
+    choice(meshes, "meshes", ("require", "ignore"))
     paths = MeshPaths(path, packages)
     document = check_files(path, paths)
     import mujoco
@@ -70,7 +81,7 @@ def read_mjcf(
     except ValueError as error:
         raise DescriptionError(f"{path}: {_one_line(error)}") from None
     repairs += [Repair(path.name, _one_line(w.message), "read as MuJoCo reads it") for w in said]
-    return _Compiled(model, path, repairs, loops).read(document.root.get("model") or path.stem)
+    return model, repairs, document.root.get("model") or path.stem
 
 
 def _one_line(error: Exception | Warning | str) -> str:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..files import replace_file
+from ..kernels._jit import _cache_root as cache_root
 from .description import Shape, ShapeKind
 from .poses import from_quaternion
 
@@ -49,8 +52,7 @@ def _shape(m: Any, g: int, path: Path, report: Report) -> Shape | None:
         k = int(m.geom_dataid[g])
         file = _mesh_file(m, k, path)
         if file is None:
-            report(what, "has a mesh without a file of its own", "left it out")
-            return None
+            return Shape(ShapeKind.MESH, (1.0, 1.0, 1.0), pose, _kept_mesh(m, k), color, name)
         scale = (float(m.mesh_scale[k, 0]), float(m.mesh_scale[k, 1]), float(m.mesh_scale[k, 2]))
         pose = pose @ np.linalg.inv(from_quaternion(m.mesh_pos[k], m.mesh_quat[k]))
         return Shape(ShapeKind.MESH, scale, pose, file, color, name)
@@ -68,3 +70,18 @@ def _mesh_file(m: Any, mesh: int, path: Path) -> Path | None:
     text = m.paths[start : m.paths.index(b"\0", start)].decode()
     file = path.parent / text
     return file.resolve() if file.is_file() else None
+
+
+def _kept_mesh(m: Any, mesh: int) -> Path:
+    """A file in the cache for a mesh that the model holds without one: as compiled, in its own frame of inertia."""
+    first, count = int(m.mesh_vertadr[mesh]), int(m.mesh_vertnum[mesh])
+    start, faces = int(m.mesh_faceadr[mesh]), int(m.mesh_facenum[mesh])
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in m.mesh_vert[first : first + count].astype(float).tolist()]
+    rows += [f"f {i + 1} {j + 1} {k + 1}" for i, j, k in m.mesh_face[start : start + faces].tolist()]
+    text = "\n".join([*rows, ""])
+    key = hashlib.sha256(text.encode()).hexdigest()[:32]
+    path = cache_root() / "mujoco" / f"{key}.obj"
+    if not path.is_file():
+        with replace_file(path) as work:
+            work.write_text(text, encoding="utf-8")
+    return path
