@@ -154,3 +154,48 @@ def test_without_diagnosis_nothing_is_searched() -> None:
     assert (sol.status[failed] == IKStatus.NOT_FOUND).all()
     assert np.array_equal(sol.q[failed], np.broadcast_to(robot.home, (failed.sum(), 6)))
     assert "no start led to the target (200 were tried)" in sol.reason(int(np.flatnonzero(failed)[0]))
+
+
+def test_the_nearest_position_alone_where_the_rotation_is_free() -> None:
+    optimize = pytest.importorskip("scipy.optimize")
+    wide = chain("RRRRRR", 5)
+    robot = narrowed(wide, 0.25)
+    T = wide.fk(configurations(wide, 60), "tip")
+    sol = ik.solve(robot, T, "tip", tolerance=[1e-6] * 3 + [np.inf] * 3)
+    failed = np.flatnonzero(~sol.success)
+    assert failed.size >= 10
+    assert set(sol.status[failed]) <= {IKStatus.LIMITS, IKStatus.OUT_OF_REACH, IKStatus.SINGULAR}
+    rng = np.random.default_rng(0)
+    bounds = list(zip(robot.limits.lower, robot.limits.upper, strict=True))
+    for i in failed[:6]:
+        goal = T[i, :3, 3]
+
+        def cost(q: np.ndarray, goal: np.ndarray = goal) -> float:
+            return float(((robot.fk(q, "tip")[:3, 3] - goal) ** 2).sum())
+
+        starts = [rng.uniform(robot.limits.lower, robot.limits.upper) for _ in range(12)]
+        best = min(optimize.minimize(cost, start, method="L-BFGS-B", bounds=bounds).fun for start in starts)
+        assert sol.residual[i, 0] <= 1.01 * np.sqrt(best) + 1e-7
+
+
+def test_a_hair_beyond_the_boundary_is_called_singular_and_beyond_a_limit_is_not() -> None:
+    robot = chain("CCCCCC", 1)
+    T = robot.fk(configurations(robot, 40), "tip")
+    T[:, :3, 3] *= 4.0
+    far = ik.solve(robot, T, "tip")
+    inner = np.flatnonzero(~far.limiting.any(axis=1))
+    assert inner.size >= 5
+    edge = robot.fk(far.q[inner], "tip")  # the boundary of what the arm reaches with these orientations
+    assert ik.solve(robot, edge, "tip").success.all()
+    away = T[inner, :3, 3] - edge[:, :3, 3]
+    beyond = edge.copy()
+    beyond[:, :3, 3] += 3e-5 * away / np.linalg.norm(away, axis=1, keepdims=True)
+    sol = ik.solve(robot, beyond, "tip")
+    assert (sol.status[~sol.success] == IKStatus.SINGULAR).mean() > 0.7
+    i = int(np.flatnonzero(sol.status == IKStatus.SINGULAR)[0])
+    assert "comes within a hair" in sol.reason(i)
+    narrow = narrowed(chain("RRRRRR", 3), 0.35)
+    q = np.where(np.arange(6) == 3, narrow.limits.upper + 2e-5, configurations(narrow, 30))
+    just = ik.solve(narrow, narrow.fk(q, "tip"), "tip")
+    assert (just.status[~just.success] == IKStatus.LIMITS).all()
+    assert (~just.success).sum() >= 3

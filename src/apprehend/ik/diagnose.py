@@ -17,7 +17,9 @@ from .result import IKStatus
 NEAREST_STARTS = 96
 NEAREST_STEPS = 120
 NEARLY = 100.0
-"""A nearest pose within this many tolerances is called singular: the descent crawls there, but has not ended."""
+NEAR = 1e-3
+"""A nearest pose within `NEARLY` tolerances, and within `NEAR`, is called singular: it is missed by a hair, in a
+direction in which the chain cannot move there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +31,18 @@ class Diagnosis:
     certified: BoolArray
 
 
-def diagnose(chain: PreparedChain, poses: Array, targets: Array, guesses: Array | None, request: Request) -> Diagnosis:
-    """Reasons for the targets ``(F, 12)`` (poses ``(F, 4, 4)``) that no start reached."""
+def diagnose(
+    chain: PreparedChain,
+    poses: Array,
+    targets: Array,
+    guesses: Array | None,
+    request: Request,
+    nearest_known: tuple[Array, Array] | None = None,
+) -> Diagnosis:
+    """Reasons for the targets ``(F, 12)`` (poses ``(F, 4, 4)``) that no start reached.
+
+    *nearest_known*: kernel coordinates and costs of the nearest poses, where tolerances differ from axis to axis.
+    """
     count = targets.shape[0]
     codes = np.full(count, IKStatus.NOT_FOUND.code, dtype=np.int64)
     box = request.box
@@ -38,7 +50,7 @@ def diagnose(chain: PreparedChain, poses: Array, targets: Array, guesses: Array 
     if np.isfinite(box[:3]).all():
         certified = chain.bound.beyond(poses, *request.slack(chain.reach))
     codes[certified] = IKStatus.OUT_OF_REACH.code
-    x, cost = nearest(chain, targets, guesses, request.seed)
+    x, cost = nearest(chain, targets, guesses, request.seed) if nearest_known is None else nearest_known
     open_ = np.flatnonzero(~certified)
     if open_.size:
         wide = chain.without_limits()
@@ -47,10 +59,9 @@ def diagnose(chain: PreparedChain, poses: Array, targets: Array, guesses: Array 
         found = run(wide, targets[open_], None if guesses is None else guesses[open_], free)[1] > 0
         codes[open_[found]] = IKStatus.LIMITS.code
         rest = open_[~found]
-        if not request.partial:
-            codes[rest] = IKStatus.OUT_OF_REACH.code
-            crawling = cost[open_] <= 0.5 * (NEARLY * max(box[0], box[3])) ** 2
-            codes[open_[crawling]] = IKStatus.SINGULAR.code
+        near = min(NEARLY * float(box[np.isfinite(box)].min()), NEAR)
+        crawling = cost[rest] <= 0.5 * near**2
+        codes[rest] = np.where(crawling, IKStatus.SINGULAR.code, IKStatus.OUT_OF_REACH.code)
     return Diagnosis(codes, x, certified)
 
 

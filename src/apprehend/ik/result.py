@@ -19,7 +19,9 @@ class IKStatus(Status):
     OUT_OF_REACH = "no joint vector reaches the target"
     LIMITS = "the target can be reached, but only outside the joint limits"
     COLLISION = "the target is reached within the limits, but no solution found was accepted as free of collision"
-    SINGULAR = "the chain comes close, but is singular there: the tolerance is met slowly or not at all"
+    SINGULAR = (
+        "the chain comes within a hair of the target, but cannot move in the direction that is missing: a singularity"
+    )
     NOT_FOUND = "no start led to the target"
     CONFLICT = "every frame reaches its target alone, but no start led all of them there at once"
 

@@ -20,6 +20,7 @@ from .chain import PreparedChain, prepare
 from .diagnose import diagnose as diagnose_failures
 from .queue import Request, run
 from .result import IKResult, IKStatus
+from .tree import TreeProblem, nearest_in_tree
 
 Accept = Callable[[Array], Any]
 """Says for joint vectors ``(N, n)`` which are acceptable ``(N,)``: free of collision, for instance."""
@@ -86,7 +87,7 @@ def solve(
     if found.all():
         q[:, :, chain.free] = chain.from_kernel(x, near[:, None, :])
     else:
-        _fill_failures(robot, problem, x, found, codes, certified, q, limiting, diagnose)
+        _fill_failures(robot, frame, problem, x, found, codes, certified, q, limiting, diagnose)
     if n_solutions > 1:
         spare = (np.arange(n_solutions) >= found[:, None]) & (found > 0)[:, None]
         q = np.where(spare[..., None], q[:, :1], q)
@@ -174,8 +175,20 @@ def _search(problem: _Problem, accept: Accept | None) -> tuple[Array, IntArray, 
     return x, found, starts, codes, certified
 
 
+def _nearest_partial(robot: Robot, frame: str, part: _Problem) -> tuple[Array, Array]:
+    """Kernel coordinates that come nearest where the axes have tolerances of their own, and half the squared errors."""
+    chain = part.chain
+    box = part.request.box.copy()
+    box[:3] *= chain.reach
+    guesses = np.ascontiguousarray(part.fill[:, None, :])
+    problem = TreeProblem(robot, (frame,), (chain,), part.poses[:, None], box[None], guesses, part.request.seed)
+    q, cost = nearest_in_tree(problem, np.arange(part.poses.shape[0]))
+    return chain.to_kernel(q), 0.5 * cost
+
+
 def _fill_failures(
     robot: Robot,
+    frame: str,
     problem: _Problem,
     x: Array,
     found: IntArray,
@@ -192,7 +205,8 @@ def _fill_failures(
     failed = np.flatnonzero(~known & (codes != IKStatus.COLLISION.code))
     if diagnose and failed.size:
         part = problem.some(failed)
-        why = diagnose_failures(chain, part.poses, part.targets, part.guesses, problem.request)
+        known_nearest = _nearest_partial(robot, frame, part) if problem.request.partial else None
+        why = diagnose_failures(chain, part.poses, part.targets, part.guesses, problem.request, known_nearest)
         codes[failed], certified[failed] = why.codes, why.certified
         values[failed] = chain.from_kernel(why.x, part.near)[:, None, :]
         known[failed] = True
