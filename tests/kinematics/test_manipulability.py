@@ -173,8 +173,11 @@ def test_pictures(part: str, tmp_path) -> None:  # type: ignore[no-untyped-def]
     axes = draw(robot, q, frame, kinds, part)
     axes.figure.savefig(tmp_path / "shapes.png")
     assert (tmp_path / "shapes.png").stat().st_size > 5000
-    labels = {text.get_text() for text in axes.get_legend().get_texts()}
-    assert labels == set(kinds)
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert [label.split(", to ")[0] for label in labels] == list(kinds)
+    sigma = manipulability(robot, q, frame, part).sigma[0]
+    unit = "rad/s" if part == "angular" else "m/s"
+    assert labels[0].endswith(f"to {sigma:.3g} {unit}")
     with pytest.raises(InputError, match="kinds is 'sphere'"):
         draw(robot, q, frame, ("sphere",))
     with pytest.raises(InputError, match="a picture shows one configuration"):

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from .console import console, print_json
-
-RobotName = Annotated[str, typer.Argument(help="catalogue name or description file")]
-Joints = Annotated[str | None, typer.Option("--q", help="joint values, comma-separated", show_default="home")]
-Degrees = Annotated[bool, typer.Option("--deg", help="angles in degrees, in and out")]
-Json = Annotated[bool, typer.Option("--json", help="print JSON")]
+from .options import CutLoops, Degrees, Joints, Json, RobotName, load
 
 
 def command(
@@ -19,17 +16,17 @@ def command(
     frame: Annotated[str | None, typer.Argument(help="frame; without one: all")] = None,
     q: Joints = None,
     deg: Degrees = False,
+    cut_loops: CutLoops = False,
     as_json: Json = False,
 ) -> None:
     """Print poses in the robot's base frame: position in m, fixed-axis roll, pitch, yaw."""
     from rich.table import Table
 
     from ..conventions import DEGREE
-    from ..kinematics import Robot
     from ..spatial import Rotation
     from .values import joints
 
-    model = Robot.load(robot)
+    model = load(robot, cut_loops)
     values = joints(q, model, deg)
     frames = model.frame_names if frame is None else (frame,)
     poses = {name: model.fk(values, name) for name in frames}
@@ -42,7 +39,7 @@ def command(
         table.add_column(column, header_style="dim", justify="left" if column == "frame" else "right")
     for name, T in poses.items():
         rpy = Rotation(T[:3, :3]).rpy() / (DEGREE if deg else 1.0)
-        table.add_row(name, *(f"{v:.5f}" for v in T[:3, 3]), *(f"{v:.5f}" for v in rpy))
+        table.add_row(name, *(fixed(v) for v in (*T[:3, 3], *rpy)))
     console.print(table)
 
 
@@ -51,22 +48,48 @@ def jacobian(
     frame: Annotated[str, typer.Argument(help="frame")],
     q: Joints = None,
     reference: Annotated[str, typer.Option(help="mixed, spatial or body")] = "mixed",
+    part: Annotated[str, typer.Option(help="measured and drawn: both, linear, angular, xy, xz or yz")] = "both",
+    picture: Annotated[
+        Path | None, typer.Option(help="draw the ellipsoids of velocity and force of that part (.png, .svg, .pdf)")
+    ] = None,
     deg: Degrees = False,
+    cut_loops: CutLoops = False,
     as_json: Json = False,
 ) -> None:
-    """Print the Jacobian (rows v, ω) with its rank, singular values and manipulability."""
-    import numpy as np
-
-    from ..kinematics import Robot
+    """Print the Jacobian (rows v, ω), its rank, lost directions, singular values and K's measures µ1, µ2, µ3."""
+    from ..kinematics import draw, manipulability
     from .values import joints
 
-    model = Robot.load(robot)
-    J = model.jacobian(joints(q, model, deg), frame, reference)
-    sigma = np.linalg.svd(J, compute_uv=False)
+    model = load(robot, cut_loops)
+    values = joints(q, model, deg)
+    J = model.jacobian(values, frame, reference)
+    m = manipulability(model, values, frame, part)
+    lost = m.lost()
+    if picture is not None:
+        kinds = ("velocity ellipsoid",) if m.singular else ("velocity ellipsoid", "force ellipsoid")
+        draw(model, values, frame, kinds, "linear" if part == "both" else part).figure.savefig(picture)
     if as_json:
-        print_json({"jacobian": J.tolist(), "singular_values": sigma.tolist(), "joints": list(model.joint_names)})
+        print_json(
+            {
+                "joints": list(model.joint_names), "reference": reference, "jacobian": J.tolist(), "part": part,
+                "singular_values": m.sigma.tolist(), "rank": int(m.rank), "lost": lost.tolist(),
+                "mu1": float(m.mu1), "mu2": float(m.mu2), "mu3": float(m.mu3), "yoshikawa": float(m.yoshikawa),
+            }
+        )  # fmt: skip
         return
     for label, row in zip(("vx", "vy", "vz", "ωx", "ωy", "ωz"), J, strict=True):
-        console.print(f"{label}  " + "  ".join(f"{v:9.5f}" for v in row))
-    console.print(f"\nsingular values  {'  '.join(f'{s:.4g}' for s in sigma)}")
-    console.print(f"rank {np.linalg.matrix_rank(J)}, manipulability √det(JJᵀ) = {float(np.prod(sigma)):.4g}")
+        console.print(f"{label}  " + "  ".join(f"{fixed(v):>9}" for v in row), soft_wrap=True)
+    console.print(f"\n{part}: rank {int(m.rank)} of {m.rows}; singular values {'  '.join(f'{s:.4g}' for s in m.sigma)}")
+    for direction in lost:
+        console.print("lost direction  " + "  ".join(f"{fixed(v):>9}" for v in direction))
+    console.print(
+        f"µ1 = σ_min(A) {float(m.mu1):.4g}, µ2 = σ_min(A)/σ_max(A) {float(m.mu2):.4g}, "
+        f"µ3 = det A {float(m.mu3):.4g} of A = JJᵀ; √det A {float(m.yoshikawa):.4g}",
+        soft_wrap=True,
+    )
+
+
+def fixed(value: float) -> str:
+    """Five decimals, and no minus before a zero."""
+    text = f"{value:.5f}"
+    return text[1:] if text == "-0.00000" else text

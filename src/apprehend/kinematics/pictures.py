@@ -31,7 +31,8 @@ def draw(
     """Draw the chain to *frame* at one ``q (n,)`` and, around the frame, each of *kinds* (see `KINDS`).
 
     *part* is ``"linear"`` or ``"angular"`` (in space), or ``"xy"``, ``"xz"``, ``"yz"`` (in that plane of the world).
-    Each shape is scaled to half the size of the arm; a shape that is unbounded or flat here is refused by its
+    Each shape is scaled to half the size of the arm, and the legend says how far it really extends (an ellipsoid: for
+    joint speeds, or torques, whose squares sum to 1); a shape that is unbounded or flat here is refused by its
     function. Returns the matplotlib axes; ``axes.figure.savefig(...)`` writes the picture.
     """
     choice(part, "part", tuple(p for p in PARTS if p != "both"))
@@ -50,15 +51,24 @@ def draw(
     for kind in kinds:
         shape = _outline(robot, q, frame, kind, part)
         scale = size / max(float(np.abs(np.concatenate(shape)).max()), 1e-300)
+        extent = float(np.linalg.norm(np.concatenate(shape), axis=1).max())
+        label = f"{kind}, to {extent:.3g} {_unit(kind, part)}"
         for k, curve in enumerate(shape):
             points = center + scale * curve
-            axes.plot(*points.T, color=COLORS[kind], linewidth=1.2, label=kind if k == 0 else None)
+            axes.plot(*points.T, color=COLORS[kind], linewidth=1.2, label=label if k == 0 else None)
     axes.set_aspect("equal")
     for name, r in zip("xyz", rows, strict=False):
         getattr(axes, f"set_{name}label")(f"{'xyz'[r]} (m)")
     axes.set_title(f"{robot.name}: {frame}")
     axes.legend(loc="best", fontsize="small")
     return axes
+
+
+def _unit(kind: str, part: str) -> str:
+    """Of the numbers of a shape; those of the ellipsoids are for joint speeds, or torques, of 1 in all."""
+    if kind.startswith("velocity"):
+        return "rad/s" if part == "angular" else "m/s"
+    return "N m" if part == "angular" else "N"
 
 
 def new_axes(dimensions: int) -> Any:
