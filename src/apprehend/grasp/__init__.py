@@ -1,15 +1,15 @@
 """Grasps: contacts, closure and quality, contact forces, and planning on meshes."""
 
-from .candidates import Candidate, GraspPlan, PlanStatus
+from .candidates import Candidate, GraspPlan, HandCandidate, PlanStatus
 from .closure import Closure, ClosureStatus
 from .closures import Closures, closed, force_closures
 from .contact import Contact, ContactModel
 from .files import read_grasp
-from .force_program import Limits
 from .forces import ContactForces, ForceBatch, ForceStatus
 from .grasp import Grasp
 from .hand_grasp import HandGrasp, hand_jacobian
 from .jaw_plan import plan
+from .limits import Limits
 from .patch import Patch
 from .picture import save_picture
 from .push import Push
@@ -28,6 +28,7 @@ __all__ = [
     "ForceStatus",
     "Grasp",
     "GraspPlan",
+    "HandCandidate",
     "HandGrasp",
     "Limits",
     "Patch",

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import Array
 from ..result import Result, Status
 from .contact import Contact
+
+if TYPE_CHECKING:
+    from ..bodies import Body
+    from .grasp import Grasp
 
 
 class PlanStatus(Status):
@@ -22,12 +27,13 @@ class PlanStatus(Status):
     NO_APPROACH = "no closing line can be approached from the directions that are asked for"
     NO_ROOM = "the open hand has no room: it would hit the body, or the table, wherever it could close"
     NO_CONTACT = "the pads would not meet opposite surfaces firmly enough"
+    NO_CLOSURE = "wherever the fingers touch, the contacts do not resist every wrench"
     TOO_WEAK = "the hand is too weak to hold the body with the friction given"
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One grasp of a body by a parallel jaw, in the frame of the body."""
+    """One grasp of a body, in the frame of the body; here by a parallel jaw."""
 
     pose: Array
     """T_body_hand ``(4, 4)``: where the hand's root link is when the pads touch."""
@@ -37,7 +43,7 @@ class Candidate:
     """Distance between the pads at contact, in m."""
     opening: float
     """Distance between the pads while approaching, in m."""
-    contacts: tuple[Contact, Contact]
+    contacts: tuple[Contact, ...]
     """Soft fingers where pad 0 and pad 1 touch."""
     quality: float
     """Between 0 and 1; see `plan`."""
@@ -58,6 +64,28 @@ class Candidate:
         T = self.pose.copy()
         T[:3, 3] -= distance * self.approach
         return T
+
+
+@dataclass(frozen=True, eq=False)
+class HandCandidate(Candidate):
+    """A grasp by a hand with several fingers. ``width`` is the largest distance between two contacts."""
+
+    q: Array
+    """Joints of the hand ``(n,)`` when it touches."""
+    pregrasp: Array
+    """Joints ``(n,)`` from which the fingers close."""
+    links: tuple[str, ...]
+    """The link that makes each contact."""
+    method: str
+    """``"inverse"`` (hand kinematics to chosen contacts) or ``"closing"`` (contact-based)."""
+    internal_force: Array
+    """The strict internal force that proves force closure; see `Closure`."""
+
+    def grasp(self, body: Body) -> Grasp:
+        """The grasp of *body* with these contacts."""
+        from .grasp import Grasp
+
+        return Grasp(self.contacts, body)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +122,13 @@ class GraspPlan(Result):
         f = {k: 1e3 * v for k, v in self.facts.items()}
         who = f"{self.hand!r} on {self.body!r}"
         if self.status is PlanStatus.SUCCESS:
-            return f"{who}: {len(self.candidates)} grasps, best quality {self.candidates[0].quality:.2f}"
+            ways = [k.removeprefix("found_") for k in self.facts if k.startswith("found_")]
+            by = ", ".join(
+                f"{self.facts['found_' + w]:.0f} of {self.facts['tried_' + w]:.0f} tries by {w}" for w in ways
+            )
+            return f"{who}: {len(self.candidates)} grasps, best quality {self.candidates[0].quality:.2f}" + (
+                f" ({by})" if by else ""
+            )
         counts = ", ".join(f"{n} {why}" for why, n in self.rejected.items() if n)
         if self.status is PlanStatus.TOO_WIDE:
             return (
@@ -109,7 +143,7 @@ class GraspPlan(Result):
             )
         if self.status is PlanStatus.NO_OPPOSITE_SIDES:
             return f"{who}: {self.status.value} (µ = {self.facts['friction']:g}); is the mesh closed, and µ right?"
-        if self.status is PlanStatus.TOO_WEAK:
+        if self.status is PlanStatus.TOO_WEAK and "least_force" in self.facts:
             return (
                 f"{who}: {self.status.value}: the easiest grasp needs {self.facts['least_force']:.1f} N at each pad, "
                 f"{self.facts['max_force']:.1f} N are allowed ({counts})"

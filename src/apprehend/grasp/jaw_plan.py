@@ -1,13 +1,15 @@
-"""Grasp planning for parallel jaws on the mesh itself."""
+"""Grasp planning on the mesh itself, for parallel jaws and for hands with several fingers."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import choice
 from ..bodies import Body
 from ..kinematics import Hand
 from .candidates import GraspPlan
+from .hand_settings import HandSettings, checked_hand
 from .jaw_search import Search
 from .jaw_settings import Settings, checked, directions, half_spaces
 
@@ -33,16 +35,30 @@ def plan(
     safety: float = 2.0,
     acceleration: float = 2.0,
     apart: tuple[float, float] = (0.01, np.radians(20.0)),
+    method: str = "both",
 ) -> GraspPlan:
-    """Plan up to *n* grasps of *body* by the parallel jaw of *hand*, best first (G 2; G 4: plan for object and scene).
+    """Plan up to *n* grasps of *body* by *hand*, best first (G 2; G 4: plan for object and scene).
 
-    Antipodal pairs of surface points are found by ray casting on the mesh; each closing line is tried at *angles*
-    approach directions around it and at several depths. A pose counts if the open hand (convex pieces of all links,
-    at least *clearance* wider than the body on each side) meets neither the body nor the table, also while it comes
-    from *standoff* back along the approach; if the pads, resting on what stands out most (*compliance* deep), touch two
-    patches whose normals lie within the friction cones of their connecting line by *cone_margin*; if the closed hand
-    has room; and if the hand can hold the weight and accelerations of *acceleration* m/s² in every direction with
-    *safety*, pressing with at most *max_force* (default: what the hand can).
+    **Hands with several fingers** are planned by both ways of G 4's table, or by one: *method* ``"inverse"`` chooses
+    sets of surface points that close (`force_closures`), finds palm pose and joints that bring the pads there
+    (`ik.solve_frames` on a floating palm), draws the pads back, and closes; ``"closing"`` puts the place that the pads
+    of a pre-grasp posture face into the body, comes from outside as far as there is room, and closes until contact.
+    Closing stops by exact distances of the links' convex shapes from the mesh, at most 0.3 mm off it: no link
+    penetrates. Candidates are `HandCandidate`: joints, pre-grasp, one contact per link that touches, the internal
+    force that proves force closure; ``quality`` is the certified lower bound of ε (L1, exact cones, torques over the
+    body's radius), and ``margins`` hold it with ``closure``, ``contacts``, ``position`` (m that every contact may be
+    off), ``force`` (N), ``com_distance``, ``distance`` (of the nearest link, in m). The contact forces must hold weight
+    and acceleration within the efforts of the joints where they are known. *samples* are tries per way; *approach*,
+    *table*, *friction*, *max_force*, *safety*, *acceleration* and *apart* mean the same for all hands, the other
+    options concern jaws.
+
+    **Parallel jaws**: antipodal pairs of surface points are found by ray casting on the mesh; each closing line is
+    tried at *angles* approach directions around it and at several depths. A pose counts if the open hand (convex
+    pieces of all links, at least *clearance* wider than the body on each side) meets neither the body nor the table,
+    also while it comes from *standoff* back along the approach; if the pads, resting on what stands out most
+    (*compliance* deep), touch two patches whose normals lie within the friction cones of their connecting line by
+    *cone_margin*; if the closed hand has room; and if the hand can hold the weight and accelerations of *acceleration*
+    m/s² in every direction with *safety*, pressing with at most *max_force* (default: what the hand can).
 
     *friction* µ (default: the body's). *table*: the body's pose T_table_body ``(4, 4)`` on a table whose top is z = 0,
     or half-spaces ``(K, 4)`` in the frame of the body: rows (n, d) keep ``n·x ≥ d`` free for the hand; gravity acts
@@ -59,8 +75,18 @@ def plan(
 
     γ of a contact is µ times the mean distance of its patch from the patch's middle (even pressure), at least the
     body's `torsional_friction`. The answer is the same for the same state of *rng*. Raises `InputError` for arguments
-    without meaning and `DescriptionError` if the hand has no parallel jaw.
+    without meaning and `DescriptionError` if the hand has neither a jaw nor two fingers with geometry.
     """
+    choice(method, "method", ("both", "inverse", "closing"))
+    if not hand.is_jaw:
+        given = HandSettings(
+            body.friction if friction is None else float(friction),
+            ("inverse", "closing") if method == "both" else (method,), samples, half_spaces(table), acceleration,
+            safety, apart, np.inf if max_force is None else float(max_force), directions(approach), approach_tolerance,
+        )  # fmt: skip
+        from .hand_plan import HandSearch
+
+        return HandSearch(hand, body, checked_hand(given, n), rng, n).run()
     jaw = hand.jaw
     mu = body.friction if friction is None else float(friction)
     settings = checked(
