@@ -249,7 +249,7 @@ def _objective(
         largest = max(float(np.abs(w).max()), 1e-300)
         return (w / largest) @ normals[0], none, ones * largest
     if objective == "min_norm":
-        return np.zeros(0), _squares(parts, maps), ones
+        return np.zeros(0), 2.0 * (maps**2).sum(axis=1), ones
     if objective in ("min_largest", "min_largest_norm", "min_torque"):
         if objective == "min_torque" and torque is None:
             raise InputError('objective "min_torque" needs limits.hand_jacobian')
@@ -299,23 +299,6 @@ def _eigen_units(parts: Parts) -> Array:
                 units[:, column] = 1.0 / np.maximum(parts.friction[:, i] if j == 0 else parts.torsion[:, i], 1e-12)
             column += size
     return units
-
-
-def _squares(parts: Parts, maps: Array) -> Array:
-    """Diagonals Q ``(N, n)`` with ``½ xᵀ Q x = ‖f‖²`` on the cone program's feasible set."""
-    Q: Array = 2.0 * (maps**2).sum(axis=1)
-    column = 0
-    for i, cc in enumerate(parts.grasp.cones):
-        if len(cc.cones) == 3:  # τ = γ (u − v) / 2 with u + v = 2 f₃: τ² = γ² (u² + v²) / 2 − γ² f₃²
-            gamma = parts.torsion[:, i]
-            if gamma.max() > 1.0:
-                raise InputError(
-                    f"torsion γ is {gamma.max()} m; the minimum norm with a box-shaped soft finger is convex up to 1 m"
-                )
-            Q[:, column] -= 2.0 * gamma**2
-            Q[:, column + 3] = Q[:, column + 4] = gamma**2
-        column += sum(cc.cones)
-    return Q
 
 
 def answers(

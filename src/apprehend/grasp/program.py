@@ -111,7 +111,6 @@ def contact_cone(contact: Contact) -> ContactCone:
         if k == 5:
             D[3, 3] = gamma
         return ContactCone((k,), D, none.reshape(0, k))
-    D = np.zeros((4, 5))  # x = (f₃, f₁/µ, f₂/µ) and (γ f₃ + τ)/γ, (γ f₃ − τ)/γ
-    D[2, 0], D[0, 1], D[1, 2] = 1.0, mu, mu
-    D[3, 3], D[3, 4] = 0.5 * gamma, -0.5 * gamma
-    return ContactCone((3, 1, 1), D, np.array([[2.0, 0.0, 0.0, -1.0, -1.0]]))
+    D = np.zeros((4, 6))  # x = (f₃, f₁/µ, f₂/µ) and (f₃, τ/γ)
+    D[2, 0], D[0, 1], D[1, 2], D[3, 4] = 1.0, mu, mu, gamma
+    return ContactCone((3, 3), D, np.array([[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]]))

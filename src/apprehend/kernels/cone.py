@@ -33,7 +33,7 @@ STEP = 0.985
 PATIENCE = 6
 TOLERANCE = 1e-9
 """Relative residuals and duality gap at which a problem counts as solved."""
-ACCEPTABLE = 1e-7
+ACCEPTABLE = 1e-6
 """What still counts as solved where rounding stops the method earlier."""
 EXTRAS = 7
 """Entries of an answer after x, y and z: status, primal and dual value, primal and dual residual, steps, size."""
@@ -63,6 +63,7 @@ def _fetch(lane, columns, right, wrench, cones, slack, floor, begin, warm, A, V_
     scale = np.sqrt(square)
     if scale < floor:
         scale = floor
+    K[SIZE, lane] = scale
     if scale == 0.0:
         scale = 1.0
     largest = 0.0
@@ -75,7 +76,7 @@ def _fetch(lane, columns, right, wrench, cones, slack, floor, begin, warm, A, V_
             A[j, r, lane] = columns[j, r] / unit
         if slack[r] >= 0:
             A[slack[r], r, lane] = columns[slack[r], r]
-    K[SIZE, lane], K[NORM_B, lane], largest = scale, largest, 0.0
+    K[NORM_B, lane], largest = largest, 0.0
     K[TAU, lane], K[LEAST, lane], K[SINCE, lane], K[STEPS, lane] = 1.0, np.inf, 0.0, 0.0
     cold = 1.0 if warm <= 0.0 or begin[2 * n + rows] != OPTIMAL else warm
     s, i, dot = 0, 0, 0.0
@@ -126,7 +127,7 @@ def _measure(A, V_, R, K, degree):  # type: ignore[no-untyped-def]
     mu *= 1.0 / degree
     half = 0.5 * quad * share
     primal, dual = (cx + half) * share, (by - half) * share
-    gap = size(primal - dual) / larger(1.0, smaller(size(primal), size(dual)))
+    gap = size(primal - dual) / larger(0.01, smaller(size(primal), size(dual)))
     ep, ed = ep * share / (1.0 + load(K, NORM_B)), ed * share / (1.0 + load(K, NORM_C))
     store(K, PRIMAL, primal)
     store(K, DUAL, dual)
@@ -180,14 +181,21 @@ def _verdict(lane, limit, K):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _give(lane, code, V_, R, K, best, out):  # type: ignore[no-untyped-def]
-    """Write the answer of a place."""
+def _give(lane, code, A, slack, V_, R, K, best, out):  # type: ignore[no-untyped-def]
+    """Write the answer of a place; x is put back onto the balance rows, which are orthonormal, to the last digits."""
     n, rows = V_.shape[1], R.shape[1]
     m = 2 * n + rows
     for j in range(m):
         out[j] = 0.0 if code == INVALID else best[j, lane]
     for j in range(4):
         out[m + 1 + j] = K[KEPT + j, lane]
+    for r in range(rows):
+        if slack[r] == BALANCE and code != INVALID:
+            t = R[B, r, lane]
+            for j in range(n):
+                t -= A[j, r, lane] * out[j]
+            for j in range(n):
+                out[j] += A[j, r, lane] * t
     if code in (INFEASIBLE, UNBOUNDED):
         over = 1.0 / K[BY, lane] if code == INFEASIBLE else -1.0 / K[CX, lane]
         for j in range(n):
@@ -198,7 +206,8 @@ def _give(lane, code, V_, R, K, best, out):  # type: ignore[no-untyped-def]
         out[m + 3] = out[m + 4] = over * (K[PROOF, lane] if code == INFEASIBLE else K[RAY, lane])
     for r in range(rows):
         out[n + r] /= R[UNIT, r, lane]
-    out[m], out[m + 5], out[m + 6] = code, K[STEPS, lane], K[SIZE, lane]
+    nothing = K[SIZE, lane] == 0.0 and code != OPTIMAL  # of no size, but rays have one
+    out[m], out[m + 5], out[m + 6] = code, K[STEPS, lane], 1.0 if nothing else K[SIZE, lane]
 
 
 @kernel
@@ -354,7 +363,7 @@ def solve(columns, right, wrench, cones, slack, floor, begin, warm, chain, limit
                 code = _verdict(lane, limit, K) if p >= 0 else -1
                 if code < 0:
                     continue
-                _give(lane, code, V_, R, K, best, out[p])
+                _give(lane, code, A, slack, V_, R, K, best, out[p])
                 left -= 1
             p = p + 1 if chain else following
             following += 1
