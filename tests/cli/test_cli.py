@@ -109,6 +109,9 @@ MISTAKES = {
     "too few joints": (["fk", "ur5e", "--q", "1,2"], "has 2 numbers; expected 6"),
     "words for numbers": (["ik", "ur5e", "tool0", "--xyz", "a,b,c"], "--xyz is 'a,b,c'"),
     "no episode": (["view", "out"], "out"),
+    "unknown model": (["view", "mug", "--as", "spherez", "--picture", "x.png"], "Did you mean 'spheres'"),
+    "a figure on a page": (["view", "mug", "--as", "section"], "give --picture or --save"),
+    "voxels too fine": (["view", "mug", "--as", "voxels", "--resolution", "1e-6", "--save", "v.npz"], "grid points"),
 }
 
 
@@ -129,6 +132,22 @@ def test_mistakes_are_one_paragraph(case: str, tmp_path: Path) -> None:
     assert "Traceback" not in result.stderr
     assert "\n\n" not in result.stderr.strip()
     assert not (tmp_path / "new").exists()
+
+
+def test_view_writes_models_and_pictures(tmp_path: Path) -> None:
+    told = run(
+        "view", "mug", "--as", "boxes", "--count", "3", "--save", "mug.npz", "--picture", "mug.png", cwd=tmp_path
+    )
+    assert told.returncode == 0, told.stderr
+    assert "3 boxes of mug: encloses it, sticks out by at most" in told.stdout
+    assert (tmp_path / "mug.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "mug.npz").exists()
+    told = run("view", "mug", "--as", "section", "--save", "mug.svg", cwd=tmp_path)
+    assert "section of mug: " in told.stdout
+    assert (tmp_path / "mug.svg").read_text().startswith("<svg")
+    told = run("view", "ur5e", "--as", "spheres", "--count", "4", "--save", "ur5e.urdf", cwd=tmp_path)
+    assert "spheres: encloses it" in told.stdout
+    assert "<sphere" in (tmp_path / "ur5e.urdf").read_text()
 
 
 def test_wrong_options_are_explained() -> None:

@@ -8,6 +8,7 @@ from .index import MeshIndex, Nearest
 from .load import FORMATS, UNITS
 from .models import MODELS
 from .outline import Outline
+from .picture import draw, save_picture
 from .primitives import Boxes, Capsules, ConvexPieces, Primitives, Spheres
 from .rest import RestPose
 from .surface_mesh import SurfaceMesh
@@ -36,4 +37,6 @@ __all__ = [
     "SurfaceMesh",
     "Voxels",
     "Wireframe",
+    "draw",
+    "save_picture",
 ]

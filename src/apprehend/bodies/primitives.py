@@ -29,7 +29,7 @@ MOST = 512
 """Most shapes of one model."""
 
 SAMPLES = 8192
-"""Points at which the volumes of unions are compared."""
+"""Points at which models of more and fewer shapes are compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,24 +327,27 @@ Fitted = TypeVar("Fitted", bound=Primitives)
 
 
 def _best(make: Callable[[Array], Fitted], index: MeshIndex, count: int, cost: Cost) -> Fitted:
-    """The model of at most *count* shapes whose union is smallest, judged by sample points.
+    """The model of at most *count* shapes that sticks out least, then of the smallest union, judged by sample points.
 
     *make* fits one shape to the corners of each part; every part is fitted once.
     """
     if not 1 <= count <= MOST:
         raise InputError(f"count is {count}; expected 1 to {MOST} shapes")
     low, high = index.tree.boxes[0, :3], index.tree.boxes[0, 3:]
-    points = np.random.default_rng(0).uniform(1.3 * low - 0.3 * high, 1.3 * high - 0.3 * low, (SAMPLES, 3))
+    pad = 0.3 * float((high - low).max())
+    points = np.random.default_rng(0).uniform(low - pad, high + pad, (SAMPLES, 3))
+    away = index.signed_distance(points) if count > 1 else np.zeros(len(points))
     shapes_of: dict[int, tuple[Fitted, BoolArray, Array]] = {}
-    best: tuple[int, list[Fitted]] | None = None
+    best: tuple[tuple[float, int], list[Fitted]] | None = None
     for partition in partitions(index.vertices, index.faces, count, cost):
         for part in partition:
             if id(part) not in shapes_of:
                 model = make(part)
                 shapes_of[id(part)] = model, model.inside(points), part
-        covered = int(np.any([shapes_of[id(part)][1] for part in partition], axis=0).sum())
-        if best is None or covered < best[0]:
-            best = covered, [shapes_of[id(part)][0] for part in partition]
+        covered = np.any([shapes_of[id(part)][1] for part in partition], axis=0)
+        score = float(away[covered].max(initial=0.0)), int(covered.sum())
+        if best is None or score < best[0]:
+            best = score, [shapes_of[id(part)][0] for part in partition]
     assert best is not None
     first, *others = best[1]
     return first.joined(*others)

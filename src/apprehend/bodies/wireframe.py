@@ -24,7 +24,13 @@ ANGLE = math.radians(30.0)
 """Faces that meet at a larger angle have an edge between them."""
 
 RINGS = 3
-"""Sections across each axis that stand for a body whose edges do not show its size."""
+"""Sections across each axis that help to show a body that has few edges."""
+
+BARE = 0.15
+"""A body has few edges if a vertex where it bends is farther from them than this share of its largest extent."""
+
+BENT = math.radians(1.0)
+"""Where faces meet at more than this angle the surface bends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,17 +44,15 @@ class Wireframe:
     def of(cls, index: MeshIndex, angle: float = ANGLE, rings: int | None = None) -> Self:
         """The edges at which faces meet at more than *angle* rad, the rims of holes, and *rings* sections per axis.
 
-        Without *rings* there are none where the edges reach from end to end of the body along each axis, and `RINGS`
-        where they don't: a ball has no edges. With an *angle* of 0 every edge between faces of two planes is kept.
+        Without *rings* there are none where the edges pass near wherever the surface bends, and else `RINGS` (`BARE`):
+        a ball has no edges. With an *angle* of 0 every edge between faces of two planes is kept.
         """
         if not 0.0 <= angle <= math.pi:
             raise InputError(f"angle is {angle}; expected 0 to π rad")
         vertices, faces = topology.weld(index.vertices, index.faces, 0.0)
         edges = feature_edges(vertices, faces, angle)
         if rings is None:
-            size = np.ptp(vertices, axis=0)
-            reach = np.ptp(vertices[edges].reshape(-1, 3), axis=0) if len(edges) else np.zeros(3)
-            rings = 0 if (reach >= size - 0.02 * size.max()).all() else RINGS
+            rings = RINGS if _few(vertices, faces, edges) else 0
         points, pairs = [vertices], [edges]
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         for axis in range(3):
@@ -164,6 +168,15 @@ def feature_edges(vertices: Array, faces: IntArray, angle: float) -> IntArray:
     sharp = count != 2
     sharp[count == 2] = cosine < math.cos(angle) - 1e-12
     return np.asarray(keys[sharp])
+
+
+def _few(vertices: Array, faces: IntArray, edges: IntArray) -> bool:
+    """Whether *edges* leave large curved parts of the surface bare."""
+    bent = vertices[np.unique(feature_edges(vertices, faces, BENT))]
+    if not len(edges):
+        return True
+    near = BARE * float(np.ptp(vertices, axis=0).max())
+    return bool(Wireframe(vertices, edges).distance(bent).max(initial=0.0) > near)
 
 
 def _compact(points: Array, edges: IntArray) -> tuple[Array, IntArray]:

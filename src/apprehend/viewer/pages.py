@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arrays import Array
-from ..errors import InputError
+from ..arrays import Array, choice
+from ..bodies import MODELS
+from ..errors import ApprehendError, InputError
+from .draw import overlaid, stage_of
 from .live import HOST, Announce, Page
 from .looks import RGBA, link_parts
 from .marks import arrow, friction_cone
+from .models import things
 from .picture import Camera, bounds, corners_of
 from .replay import switch
 from .stage import BODY_COLOURS, Stage, Thing
@@ -21,12 +24,10 @@ from .words import number, significant
 if TYPE_CHECKING:
     from ..bodies import Body, RestPose
     from ..grasp.candidates import Candidate
-    from ..kinematics import Hand, Robot
+    from ..kinematics import Hand, LinkModels, Robot
 
-PIECE_COLOURS: tuple[RGBA, ...] = tuple(
-    (0.5 + 0.4 * math.cos(2.4 * i), 0.5 + 0.4 * math.cos(2.4 * i + 2.1), 0.5 + 0.4 * math.cos(2.4 * i + 4.2), 1.0)
-    for i in range(12)
-)
+NO_MODEL = "none"
+"""What the menu of models says when none is shown."""
 
 
 def show_robot(
@@ -37,9 +38,13 @@ def show_robot(
     open_browser: bool = True,
     block: bool = True,
     announce: Announce | None = None,
+    models: LinkModels | None = None,
 ) -> Page:
-    """A page with *robot* and a slider for every joint, in degrees or millimetres; frames can be shown."""
-    stage = Stage(robot, link_parts(robot.description))
+    """A page with *robot* and a slider for every joint, in degrees or millimetres; frames can be shown.
+
+    With *models* of its links, these are laid over them.
+    """
+    stage = stage_of(robot) if models is None else overlaid(robot, models)
     page = Page(robot.name, port=port, host=host)
     try:
         _robot_controls(page, robot, stage)
@@ -106,18 +111,21 @@ def show_body(
     open_browser: bool = True,
     block: bool = True,
     announce: Announce | None = None,
+    model: str | None = None,
 ) -> Page:
-    """A page with *body*: its mass properties, its resting poses, and its convex pieces."""
+    """A page with *body*: its mass properties, its resting poses, and its models (*model*: the one shown first)."""
+    if model is not None:
+        choice(model, "model", MODELS[1:])
     page = Page(body.name, port=port, host=host)
     try:
-        _body_controls(page, body)
+        _body_controls(page, body, model)
     except BaseException:
         page.stop()
         raise
     return page.serve(open_browser=open_browser, block=block, announce=announce)
 
 
-def _body_controls(page: Page, body: Body) -> None:
+def _body_controls(page: Page, body: Body, model: str | None = None) -> None:
     poses = body.stable_poses(min_probability=0.001)
     page.add(Stage(bodies=(Thing(body.name, body.vertices, body.faces, poses[0].pose, BODY_COLOURS[0]),)))
     reach = body.radius
@@ -142,18 +150,39 @@ def _body_controls(page: Page, body: Body) -> None:
         for mark in marks:
             mark.visible = False
         switch(gui, "centre of mass and principal axes", marks, shown=False)
-        pieces = gui.add_checkbox("convex pieces", False, hint="computed the first time, then kept on disk")
-        made: list[Any] = []
+    _model_menu(page, body, below, model)
 
-        def show_pieces(_: Any) -> None:
-            if pieces.value and not made:
-                for i, (vertices, faces) in enumerate(body.convex_pieces):
-                    made.append(page.mesh(f"{below}/piece{i}", vertices, faces, PIECE_COLOURS[i % len(PIECE_COLOURS)]))
-                gui.add_markdown(f"{len(made)} pieces, within {1e3 * body.convex_error:.1f} mm of the surface")
-            for handle in made:
-                handle.visible = pieces.value
 
-        pieces.on_update(show_pieces)
+def _model_menu(page: Page, body: Body, below: str, start: str | None) -> None:
+    """A menu of the body's models (K): the chosen one is drawn over it, and what is lost is said."""
+    gui = page.server.gui
+    with gui.add_folder("Model"):
+        menu = gui.add_dropdown("model", (NO_MODEL, *MODELS[1:]), initial_value=start or NO_MODEL)
+        count = gui.add_number("shapes at most", 24, min=1, max=512, step=1)
+        text = gui.add_markdown("")
+    drawn: list[Any] = []
+
+    def show(_: Any) -> None:
+        for handle in drawn:
+            handle.remove()
+        drawn.clear()
+        text.content = ""
+        if menu.value == NO_MODEL:
+            return
+        many = int(count.value) if menu.value in ("blocks", "boxes", "spheres", "capsules") else None
+        try:
+            model = body.model(menu.value, many)
+        except ApprehendError as error:
+            text.content = str(error)
+            return
+        alpha = 1.0 if menu.value == "wireframe" else 0.45
+        for thing in things(model, alpha=alpha):
+            drawn.append(page.mesh(f"{below}/{thing.name}", thing.vertices, thing.faces, thing.rgba))
+        text.content = f"{len(model) if hasattr(model, '__len__') else ''} {menu.value}: {body.deviation(model)}"
+
+    menu.on_update(show)
+    count.on_update(show)
+    show(None)
 
 
 def facts(body: Body) -> str:
@@ -201,6 +230,8 @@ def show_grasp(
 
 
 def _grasp_controls(page: Page, body: Body, options: Sequence[Candidate], hand: Hand) -> None:
+    from ..grasp import HandCandidate
+
     robot = hand.robot
     stage = Stage(
         robot, link_parts(robot.description), (Thing(body.name, body.vertices, body.faces, np.eye(4), BODY_COLOURS[0]),)
@@ -217,7 +248,10 @@ def _grasp_controls(page: Page, body: Body, options: Sequence[Candidate], hand: 
     def draw(_: Any) -> None:
         grasp = options[min(int(rank.value), len(options)) - 1]
         retreat = 1e-3 * back.value
-        q = robot.home.copy() if not hand.is_jaw else hand.jaw.q_at(grasp.opening if retreat else grasp.width)
+        if isinstance(grasp, HandCandidate):
+            q = grasp.pregrasp if retreat else grasp.q
+        else:
+            q = hand.jaw.q_at(grasp.opening if retreat else grasp.width)
         frames = _hand_frames(grasp.retreated(retreat), robot, q)
         page.draw(links=dict(zip(robot.frame_names, frames)))
         for mark in marks:

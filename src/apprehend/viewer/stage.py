@@ -107,7 +107,7 @@ class Stage:
             frames = self.robot.fk(self.robot.home if q is None else q)
             for name, T in zip(self.robot.frame_names, frames):
                 items += [
-                    Item(p.vertices, p.faces, T, (*p.rgba[:3], robot_alpha), gloss=0.5, normals=p.normals)
+                    Item(p.vertices, p.faces, T, (*p.rgba[:3], p.rgba[3] * robot_alpha), gloss=0.5, normals=p.normals)
                     for p in self.links.get(name, ())
                 ]
         for t in self.bodies:
