@@ -9,22 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, BoolArray, IntArray, as_array, as_shaped
+from ..arrays import Array, BoolArray, IntArray
 from ..errors import InputError
 from ..kernels import closure as kernel
 from ..parallel import over_ranges
 from .ball import Generators, separated
 from .closure import MARGIN, force_closure
-from .contact import Contact, ContactModel, check_numbers, model_of
+from .contact import ContactModel
+from .many import read_many
 
 if TYPE_CHECKING:
     from .grasp import Grasp
 
 STEPS = 12
 """Newton steps on lanes before a grasp is settled one by one."""
-CODES = {
-    ContactModel.FRICTIONLESS: 0, ContactModel.COULOMB: 1, ContactModel.SOFT: 2, ContactModel.SOFT_BOX: 3,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,44 +56,10 @@ def force_closures(
     *positions*, *normals* ``(..., k, 3)`` (unit, inward); *friction*, *torsion* ``(..., k)`` or numbers; *reference*
     ``(..., 3)`` and *length* ``(...)`` as in `Grasp`. Raises `InputError` as `Contact` does, naming the first entry.
     """
-    p = as_shaped(positions, "positions", 3)
-    n = as_shaped(normals, "normals", 3)
-    if p.ndim < 2 or p.shape != n.shape or not p.shape[-2]:
-        raise InputError(f"positions have shape {p.shape} and normals {n.shape}; expected (..., k, 3) for both")
-    size = np.linalg.norm(n, axis=-1)
-    bad = np.argwhere(np.abs(size - 1.0) > 1e-6)
-    if len(bad):
-        at = tuple(int(i) for i in bad[0])
-        raise InputError(f"normals{list(at)} has length {size[at]:.6g}; expected 1: divide normals by their length")
-    kind = model_of(model)
-    shape, k = p.shape[:-2], p.shape[-2]
-    count = int(np.prod(shape))
-
-    def spread(value: ArrayLike, name: str, *tail: int) -> Array:
-        given = as_array(value, name)
-        try:
-            full = np.broadcast_to(given, (*shape, *tail))
-        except ValueError:
-            raise InputError(f"{name} has shape {given.shape}; expected what spreads to {(*shape, *tail)}") from None
-        return np.array(full, order="C").reshape(count, *tail)
-
-    mu, gamma = spread(friction, "friction", k), spread(torsion, "torsion", k)
-    check_numbers(friction=mu, torsion=gamma)
-    about, scale = spread(reference, "reference", 3), spread(length, "length")
-    if not (scale > 0.0).all():
-        raise InputError(f"length is {scale.min()}; expected positive lengths in m")
-    points = np.ascontiguousarray(p.reshape(count, k, 3))
-    inward = np.ascontiguousarray((n / size[..., None]).reshape(count, k, 3))
-    parts = Generators(np.empty((count, k, 6)), np.empty((count, k, 3, 6)), np.empty((count, k), np.int64))
-    codes = np.full((count, k), CODES[kind], np.int64)
-    over_ranges(
-        lambda a, b: kernel.generate(
-            points[a:b], inward[a:b], mu[a:b], gamma[a:b], codes[a:b], about[a:b], 1.0 / scale[a:b],
-            *(part[a:b] for part in parts),
-        ),
-        count, 1024,
-    )  # fmt: skip
-    verdict, margin, force, wrench = decide(parts)
+    many = read_many(positions, normals, friction, model, torsion, reference, length)
+    shape, kind, mu, gamma = many.shape, many.model, many.friction, many.torsion
+    count, k = mu.shape
+    verdict, margin, force, wrench = decide(many.generators)
     closed = verdict == kernel.CLOSED
     forces = np.zeros((count, k, 4))
     used = [2] if kind is ContactModel.FRICTIONLESS else [0, 1, 2, 3][: kind.components]
@@ -103,10 +67,7 @@ def force_closures(
         ..., used
     ]
     for i in np.flatnonzero(verdict == kernel.UNDECIDED).tolist():
-        from .grasp import Grasp
-
-        contacts = [Contact(points[i, c], inward[i, c], mu[i, c], kind, gamma[i, c]) for c in range(k)]
-        one = force_closure(Grasp(contacts, reference=about[i], length=float(scale[i])))
+        one = force_closure(many.grasp(i))
         closed[i], margin[i], wrench[i] = one.success, one.margin, one.wrench
         forces[i][:, used] = one.internal_force.reshape(k, -1)
     return Closures(
