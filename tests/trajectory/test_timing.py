@@ -139,6 +139,43 @@ def test_kinks_are_passed_at_rest() -> None:
     assert timing.speed[np.searchsorted(timing.grid, 1.0)] == 0.0
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_the_unit_of_a_path_does_not_matter(unit: float) -> None:
+    """Kinks, extrema and jumps are measured by the size of the path: the same motion in every unit."""
+    points = np.array([[0.0, 5.0, 0.0], [1.0, 5.0, 0.3], [1.0, 5.0, 1.0], [0.4, 5.0, -1.0]])
+    limits = tj.Limits(velocity=unit, acceleration=2.0 * unit)
+    for path, same in (
+        (tj.polyline(points), tj.polyline(points * unit)),
+        (tj.Spline(points), tj.Spline(points * unit)),
+    ):
+        one = tj.time_optimal(path, {"velocity": 1.0, "acceleration": 2.0})
+        timing = tj.time_optimal(same, limits)
+        assert timing.duration == pytest.approx(one.duration, rel=1e-6)
+        assert timing.violation == 0.0
+        assert timing.motion.continuity(1e-7) == 1
+
+
+def test_a_torn_path_is_refused() -> None:
+    torn = tj.PolynomialPath([0.0, 1.0, 2.0], [[[0.0, 0.0], [1.0, 0.0]], [[5.0, 0.0], [1.0, 0.0]]])
+    with pytest.raises(InputError, match=r"the path jumps by 4 at s = 1; its pieces must meet"):
+        tj.time_optimal(torn, tj.Limits(1.0, 1.0))
+    with pytest.raises(InputError, match=r"the path jumps by 4 at s = 1"):
+        tj.time_optimal_many([tj.polyline([[0.0, 0.0], [1.0, 1.0], [1.0, 2.0]])] * 20 + [torn], tj.Limits(1.0, 1.0))
+
+
+def test_paths_whose_parameter_stands_still() -> None:
+    """q' = 0 at the ends or inside (singular parametrisation): the same motion as along the regular path."""
+    line = tj.time_optimal(tj.polyline([[0.0, 0.0], [1.0, 2.0]]), tj.Limits(1.0, 2.0)).duration
+    for piece in ([[0.0, 0.0], [0.0, 0.0], [1.0, 2.0]], [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [1.0, 2.0]]):
+        timing = tj.time_optimal(tj.PolynomialPath([0.0, 1.0], [piece]), tj.Limits(1.0, 2.0))
+        assert timing.violation == 0.0
+        assert timing.duration == pytest.approx(line, rel=5e-3)
+    inside = tj.PolynomialPath([-1.0, 1.0], [[[-1.0, -2.0], [3.0, 6.0], [-3.0, -6.0], [1.0, 2.0]]])  # (s³, 2 s³)
+    timing = tj.time_optimal(inside, tj.Limits(1.0, 2.0))
+    assert timing.violation == 0.0
+    assert 4.5 <= timing.duration < 5.1  # 4.5 along the regular path; ṡ would have to be infinite in the middle
+
+
 def test_refining_the_grid_never_breaks_limits_and_converges() -> None:
     path = tj.Spline(np.random.default_rng(9).normal(size=(6, 7)))
     limits = tj.Limits(velocity=1.0, acceleration=3.0)
@@ -218,6 +255,7 @@ def test_polynomials_agree_with_scipy() -> None:
         (lambda p: tj.time_optimal(p, {"velocity": 1.0, "acceleration": 1.0}, grid=0), "grid is 0"),
         (lambda p: tj.time_optimal(p, {"velocity": 1.0, "acceleration": 1.0}, grid=[0.0, 0.5]), "from 0 to 1"),
         (lambda p: tj.time_optimal(p, {"acceleration": 1.0}, start_speed=-1.0), "start_speed is -1.0"),
+        (lambda p: tj.time_optimal(p, {"acceleration": 1.0}, least=0), "least is 0"),
         (lambda p: tj.time_optimal(p, {"acceleration": 1.0}, end_speed=np.nan), "end_speed is nan"),
         (lambda p: tj.Spline([[0.0], [1.0]], [0.0]), "one per waypoint"),
         (lambda p: tj.Spline([[0.0], [1.0]], [1.0, 0.0]), r"knots\[0\] = 1"),

@@ -20,6 +20,7 @@ INFEASIBLE = 1
 START = 2
 END = 3
 STALLED = 4
+TORN = 5
 
 GRADES = 3
 """Intervals that are added at either end of a grid: see `subdivide`."""
@@ -268,24 +269,45 @@ def subdivide(breaks, parts, out):
 
 @kernel
 def kinks(breaks, coefficients, grid, pinned):
-    """Mark the grid points at breaks of the path where its tangent jumps."""
-    degree = coefficients.shape[1] - 1
-    i = 0
-    for k in range(coefficients.shape[0] - 1):
+    """Mark the grid points at breaks of the path where its tangent jumps; the grid point where the path itself jumps is
+    returned, −1 if there is none.
+
+    What counts as a jump is measured, for each coordinate by itself, by its largest motion over a piece.
+    """
+    pieces, size, n = coefficients.shape
+    moves = np.zeros(n)
+    rates = np.zeros(n)
+    for k in range(pieces):
         h = breaks[k + 1] - breaks[k]
-        jump = 0.0
-        size = 1.0
-        for j in range(coefficients.shape[2]):
+        for j in range(n):
+            move = 0.0
+            rate = 0.0
+            for p in range(size - 1, 0, -1):
+                move = (move + abs(coefficients[k, p, j])) * h
+                rate = rate * h + p * abs(coefficients[k, p, j])
+            offset = abs(coefficients[k, 0, j])
+            moves[j] = max(moves[j], move + 1e-3 * offset)  # the offsets are rounded too
+            rates[j] = max(rates[j], rate + 1e-4 * offset / h)
+    i = 0
+    for k in range(pieces - 1):
+        h = breaks[k + 1] - breaks[k]
+        kink = False
+        for j in range(n):
+            end = 0.0
             left = 0.0
-            for p in range(degree, 0, -1):
+            for p in range(size - 1, 0, -1):
+                end = (end + coefficients[k, p, j]) * h
                 left = left * h + p * coefficients[k, p, j]
-            right = coefficients[k + 1, 1, j]
-            size = max(size, abs(left), abs(right))
-            jump = max(jump, abs(left - right))
-        if jump > 1e-9 * size:
+            kink = kink or abs(left - coefficients[k + 1, 1, j]) > 1e-9 * rates[j]
+            if abs(end + coefficients[k, 0, j] - coefficients[k + 1, 0, j]) > 1e-9 * moves[j]:
+                while grid[i] < breaks[k + 1]:
+                    i += 1
+                return i
+        if kink:
             while grid[i] < breaks[k + 1]:
                 i += 1
             pinned[i] = True
+    return -1
 
 
 @kernel
@@ -298,7 +320,9 @@ def solve_into(
     rows_along(breaks, coefficients, grid, vlim, alim, sampled, bounds, binomial, rows)
     for i in range(count + 1):
         pinned[i] = False
-    kinks(breaks, coefficients, grid, pinned)
+    torn = kinks(breaks, coefficients, grid, pinned)
+    if torn >= 0:
+        return TORN, torn
     simple = sampled.shape[1] == 0
     status, stage = profile(grid, rows, size, pinned, x_start, x_end, simple, alpha, beta, x)
     if status == OK:

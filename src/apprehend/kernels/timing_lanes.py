@@ -256,6 +256,7 @@ def solve_many(
     )  # fmt: skip
     good = np.empty(WIDE)
     seconds = np.empty(WIDE)
+    torn = np.empty(WIDE, dtype=np.bool_)
     size = row_count(3, coefficients.shape[2], 0)
     rows = np.empty(((count + WIDE - 1) // WIDE, (3 * size + 2) * WIDE))
     marks = np.empty(count + 1, dtype=np.bool_)
@@ -271,7 +272,7 @@ def solve_many(
                 subdivide(own, parts[first[p] : first[p + 1]], grids[p])
             for i in range(count + 1):
                 marks[i] = False
-            kinks(own, coefficients[first[p] : first[p + 1]], grids[p], marks)
+            torn[lane] = kinks(own, coefficients[first[p] : first[p + 1]], grids[p], marks) >= 0
             for i in range(count + 1):
                 grid[i, lane] = grids[p, i]
                 pinned[i, lane] = 0.0 if marks[i] else 1.0
@@ -286,7 +287,7 @@ def solve_many(
             if together and good[p - begin] >= 0.0:
                 for i in range(count + 1):
                     x[p, i] = found[i, p - begin]
-                durations[p] = seconds[p - begin] if good[p - begin] > 0.0 else np.inf
+                durations[p] = seconds[p - begin] if good[p - begin] > 0.0 and not torn[p - begin] else np.inf
                 continue
             status, _ = solve_into(
                 breaks[first[p] + p : first[p + 1] + p + 1], coefficients[first[p] : first[p + 1]], grids[p], vlim,

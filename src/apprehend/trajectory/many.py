@@ -15,6 +15,7 @@ from ..kernels import timing_lanes as kernels
 from ..kernels.timing_cubic import WIDE
 from ..parallel import over_ranges
 from ..result import Result
+from .constraints import Constraint
 from .limits import Limits
 from .path import Path, PolynomialPath, as_polynomial
 from .timing import (
@@ -38,7 +39,7 @@ class _Group:
     durations: Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Timings(Result):
     """Answer of `time_optimal_many`: one `Timing` per path, by index; ``durations (P,)`` are infinite for failures.
 
@@ -52,6 +53,9 @@ class Timings(Result):
     _place: IntArray
     """Group and row of every path ``(P, 2)``; a group of −1: among the single ones."""
     _single: dict[int, Timing]
+
+    def __repr__(self) -> str:
+        return f"Timings({self.explain()})"
 
     def __len__(self) -> int:
         return len(self._paths)
@@ -89,11 +93,18 @@ class Timings(Result):
 
 
 def time_optimal_many(
-    paths: Sequence[Path], limits: Limits | Any, *, grid: int | ArrayLike = 200, **options: Any
+    paths: Sequence[Path],
+    limits: Limits | Any,
+    *,
+    constraints: Sequence[Constraint] = (),
+    grid: int | ArrayLike = 200,
+    start_speed: float = 0.0,
+    end_speed: float = 0.0,
+    least: int = 1,
 ) -> Timings:
     """`time_optimal` of every one of *paths*, which share the number of coordinates and the *limits*.
 
-    The answers are those of single calls with the same *options*. Paths of degree up to three without further
+    The answers are those of single calls with the same options. Paths of degree up to three without further
     constraints are solved side by side on lanes, several times faster than one by one; the others, and those that
     fail, one by one.
     """
@@ -107,25 +118,31 @@ def time_optimal_many(
     limits = Limits.read(limits)
     durations, place = np.full(len(curves), np.inf), np.full((len(curves), 2), -1)
     groups: list[_Group] = []
-    simple = not set(options) - {"least", "start_speed", "end_speed"}
+    ends = (start_speed, end_speed)
+    simple = not constraints and least >= 1 and all(np.isfinite(v) and v >= 0.0 for v in ends)
+    grid = int(grid) if isinstance(grid, np.integer) else grid
     alim = limits.pairs("acceleration", n)
     members = np.array([i for i, c in enumerate(curves) if c.degree <= 3], dtype=np.int64)
     if simple and isinstance(grid, int) and grid >= 1 and members.size and np.isfinite(alim).all():
         vlim = limits.pairs("velocity", n) * (1.0 - MARGIN)
-        for chosen, group in _on_lanes([curves[i] for i in members], vlim, alim * (1.0 - MARGIN), grid, options):
+        for chosen, group in _on_lanes([curves[i] for i in members], vlim, alim * (1.0 - MARGIN), grid, least, ends):
             place[members[chosen], 0], place[members[chosen], 1] = len(groups), np.arange(chosen.size)
             durations[members[chosen]] = group.durations
             groups.append(group)
     single = {
-        int(i): time_optimal(curves[i], limits, grid=grid, **options) for i in np.flatnonzero(durations == np.inf)
-    }
+        int(i): time_optimal(
+            curves[i], limits, constraints=constraints, grid=grid, start_speed=start_speed, end_speed=end_speed,
+            least=least,
+        )
+        for i in np.flatnonzero(durations == np.inf)
+    }  # fmt: skip
     for i, timing in single.items():
         durations[i] = timing.t[-1] if timing.success else np.inf
     return Timings(durations, curves, limits, tuple(groups), place, single)
 
 
 def _on_lanes(
-    curves: list[PolynomialPath], vlim: Array, alim: Array, grid: int, options: dict[str, Any]
+    curves: list[PolynomialPath], vlim: Array, alim: Array, grid: int, least: int, ends: tuple[float, float]
 ) -> Iterator[tuple[IntArray, _Group]]:
     """Profiles of curves of degree ≤ 3, in groups of those whose grids have one size."""
     pieces = np.array([c.breaks.size - 1 for c in curves])
@@ -133,16 +150,16 @@ def _on_lanes(
     breaks = np.concatenate([c.breaks for c in curves])
     coefficients = np.concatenate([c.at_least_cubic for c in curves])
     parts, sizes = np.empty(first[-1], dtype=np.int64), np.empty(len(curves), dtype=np.int64)
-    kernels.shares(breaks, first, grid, int(options.get("least", 1)), parts, sizes)
-    x_start, x_end = (float(options.get(name, 0.0)) ** 2 for name in ("start_speed", "end_speed"))
+    kernels.shares(breaks, first, grid, least, parts, sizes)
+    x_start, x_end = (float(speed) ** 2 for speed in ends)
     table = binomials(6)
     for size in np.unique(sizes):
         chosen = np.flatnonzero(sizes == size)
         if chosen.size < len(curves):
             own = np.repeat(sizes == size, pieces)
-            ends = np.repeat(sizes == size, pieces + 1)
+            own_breaks = np.repeat(sizes == size, pieces + 1)
             own_first = np.concatenate([[0], np.cumsum(pieces[chosen])])
-            data = breaks[ends], coefficients[own], own_first, parts[own]
+            data = breaks[own_breaks], coefficients[own], own_first, parts[own]
         else:
             data = breaks, coefficients, first, parts
         grids, x, durations = (

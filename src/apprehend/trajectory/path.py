@@ -47,12 +47,7 @@ class PolynomialPath(Piecewise):
     @cached_property
     def smooth(self) -> bool:
         """Whether the path is C² (its curvature does not jump)."""
-        return all(
-            self.degree < order
-            or self.breaks.size < 3
-            or float(np.abs(self.jumps(order)).max()) <= 1e-9 * (1.0 + float(self.extrema(order).magnitude.max()))
-            for order in range(3)
-        )
+        return self.continuity() >= min(2, self.degree)
 
 
 def as_polynomial(path: Path, tolerance: float = 1e-8, pieces: int = 2**14) -> PolynomialPath:

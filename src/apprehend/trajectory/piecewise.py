@@ -118,12 +118,14 @@ class Piecewise:
     def continuity(self, tolerance: float = 1e-9) -> int:
         """Largest k such that the function is Cᵏ: no derivative up to k jumps by more than *tolerance* × its size.
 
-        −1 stands for a jump in the value itself; a single polynomial answers its degree.
+        The size is the largest magnitude of the derivative, for every coordinate by itself. −1 stands for a jump in the
+        value itself; a single polynomial answers its degree.
         """
         for order in range(self.degree + 1):
-            size = 1.0 + float(self.extrema(order).magnitude.max())
-            jumps = self.jumps(order)
-            if jumps.size and float(np.abs(jumps).max()) > tolerance * size:
+            size = self.extrema(order, 1e-3).magnitude
+            # what rounding of the value itself makes of a derivative
+            noise = 1e-7 * np.abs(self.coefficients[:, 0]).max(axis=0) / float(np.diff(self.breaks).min()) ** order
+            if (np.abs(self.jumps(order)) > tolerance * (size + noise)).any():
                 return order - 1
         return self.degree
 

@@ -49,7 +49,7 @@ class TimingStatus(Status):
     STALLED = "The limits force the motion to a standstill in the middle of the path."
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Timing(Result):
     """Answer of `time_optimal`: the motion, its speed profile over the grid, and where it fails if it does.
 
@@ -70,6 +70,10 @@ class Timing(Result):
     reason: str = ""
     margin: float = 0.0
     sampled: Sampled | None = None
+
+    def __repr__(self) -> str:
+        what = f"{float(self.t[-1]):.6g} s, {self.grid.size - 1} intervals" if self.success else self.explain()
+        return f"Timing({what})"
 
     def explain(self) -> str:
         """The outcome, with the place and the constraint of a failure."""
@@ -157,6 +161,8 @@ def time_optimal(
             raise InputError(f"{name} is {speed}; expected ṡ ≥ 0 along the path")
     if not constraints and not np.isfinite(alim).all():
         _refuse_unbounded(curve, alim)
+    if least < 1:
+        raise InputError(f"least is {least}; expected a number of intervals per piece ≥ 1")
     adaptive = isinstance(grid, (int, np.integer))
     while True:
         problem = _Problem(
@@ -218,6 +224,10 @@ class _Problem:
         self, status: int, stage: int, alpha: Array, beta: Array, speed: Array, t: Array, timing: Array,
         sampled: Sampled | None,
     ) -> Timing:  # fmt: skip
+        if status == kernels.TORN:
+            where = float(self.grid[stage])
+            gap = float(np.abs(self.path.jumps(0)[int(np.searchsorted(self.path.breaks, where)) - 1]).max())
+            raise InputError(f"the path jumps by {gap:.6g} at s = {where:.6g}; its pieces must meet")
         kind = {
             kernels.START: TimingStatus.START_SPEED,
             kernels.END: TimingStatus.END_SPEED,
