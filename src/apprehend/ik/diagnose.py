@@ -15,7 +15,7 @@ from .queue import Request, run
 from .result import IKStatus
 
 NEAREST_STARTS = 96
-NEAREST_STEPS = 120
+NEAREST_STEPS = 400
 NEARLY = 100.0
 NEAR = 1e-3
 """A nearest pose within `NEARLY` tolerances, and within `NEAR`, is called singular: it is missed by a hair, in a
@@ -24,10 +24,12 @@ direction in which the chain cannot move there."""
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """For each failed target: the status, the nearest kernel coordinates ``(F, k)``, and whether it is certified."""
+    """For each failed target: the status, the nearest kernel coordinates ``(F, k)``, what they cost, and whether the
+    status is certified."""
 
     codes: IntArray
     x: Array
+    cost: Array
     certified: BoolArray
 
 
@@ -62,7 +64,7 @@ def diagnose(
         near = min(NEARLY * float(box[np.isfinite(box)].min()), NEAR)
         crawling = cost[rest] <= 0.5 * near**2
         codes[rest] = np.where(crawling, IKStatus.SINGULAR.code, IKStatus.OUT_OF_REACH.code)
-    return Diagnosis(codes, x, certified)
+    return Diagnosis(codes, x, cost, certified)
 
 
 def nearest(chain: PreparedChain, targets: Array, guesses: Array | None, seed: int) -> tuple[Array, Array]:

@@ -87,7 +87,7 @@ def solve(
     if found.all():
         q[:, :, chain.free] = chain.from_kernel(x, near[:, None, :])
     else:
-        _fill_failures(robot, frame, problem, x, found, codes, certified, q, limiting, diagnose)
+        _fill_failures(robot, frame, problem, x, found, codes, certified, q, limiting, diagnose, accept)
     if n_solutions > 1:
         spare = (np.arange(n_solutions) >= found[:, None]) & (found > 0)[:, None]
         q = np.where(spare[..., None], q[:, :1], q)
@@ -197,6 +197,7 @@ def _fill_failures(
     q: Array,
     limiting: BoolArray,
     diagnose: bool,
+    accept: Accept | None,
 ) -> None:
     """Write solutions into q, and for the targets without, their reasons and the nearest joint vectors."""
     chain = problem.chain
@@ -214,6 +215,20 @@ def _fill_failures(
     if diagnose and failed.size:
         at = q[failed[:, None], 0, chain.free]
         limiting[failed[:, None], chain.free] = (at <= chain.lower + 1e-9) | (at >= chain.upper - 1e-9)
+        # at a singularity the steps creep, and only the long descent to the nearest pose gets there
+        late = failed[_reaches(robot, frame, part, q[failed, 0], why.cost)]
+        if accept is not None and late.size:
+            late = late[np.asarray(accept(q[late, 0]), dtype=bool)]
+        codes[late], found[late], limiting[late] = IKStatus.SUCCESS.code, 1, False
+
+
+def _reaches(robot: Robot, frame: str, part: _Problem, q: Array, cost: Array) -> BoolArray:
+    """Which of the nearest joint vectors are within the tolerance."""
+    if part.request.partial:
+        return cost <= 0.0
+    tolerance = part.request.box[3]
+    inside: BoolArray = (residual_of(robot, frame, q, part.poses) <= tolerance).all(axis=1)
+    return inside
 
 
 def _accepted(problem: _Problem, accept: Accept) -> tuple[Array, IntArray, IntArray, BoolArray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from .chain import PreparedChain
 
 WHY_STARTS = 60
 """Starts of every search for a reason."""
+CANDIDATES = 4
+"""Searches for the nearest joint vector."""
 POLISH = 300
 """Steps of the last descent to the nearest joint vector."""
 
@@ -112,18 +114,24 @@ def run_tree(
 
 
 def nearest_in_tree(problem: TreeProblem, index: IntArray) -> tuple[Array, Array]:
-    """Joint vectors ``(M, n)`` within the limits that come nearest to the targets *index*: the best of many descents,
-    followed to its end; and the sums ``(M,)`` of the squared errors outside the tolerances, over the reach and in rad.
+    """Joint vectors ``(M, n)`` within the limits that come nearest to the targets *index*, and costs ``(M,)``: the
+    sum of the squared errors, lengths over the reach, and 0 within the tolerances.
+
+    The best of the starts of each of `CANDIDATES` searches is followed to its end.
     """
-    best = run_tree(problem, index, WHY_STARTS, nearest=True)[3]
     rows = _rows(problem, index, True)
-    cost = np.empty(index.size)
+    best, lowest = np.empty((index.size, problem.robot.n)), np.full(index.size, np.inf)
+    for number in range(CANDIDATES):
+        q = run_tree(replace(problem, seed=problem.seed + number), index, WHY_STARTS, nearest=True)[3]
+        cost = np.empty(index.size)
 
-    def work(first: int, last: int) -> None:
-        descend_tree(
-            problem.robot.model, rows.tasks, rows.data, rows.box, rows.scale, rows.lower, rows.upper, POLISH, first,
-            last, best, cost,
-        )  # fmt: skip
+        def work(first: int, last: int, q: Array = q, cost: Array = cost) -> None:
+            descend_tree(
+                problem.robot.model, rows.tasks, rows.data, rows.box, rows.scale, rows.lower, rows.upper, POLISH, first,
+                last, q, cost,
+            )  # fmt: skip
 
-    over_ranges(work, index.size, 16)
-    return best, cost
+        over_ranges(work, index.size, 16)
+        better = cost < lowest
+        best[better], lowest[better] = q[better], cost[better]
+    return best, lowest

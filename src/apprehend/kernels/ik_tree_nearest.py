@@ -22,7 +22,10 @@ REST = 1e-13  # a relative gain below this, several times in a row, ends a desce
 
 @kernel
 def descend_tree(tree, tasks, data, box, scale, lower, upper, most, first, last, q, cost):
-    """Move the rows first … last of ``q (N, n)`` to where their ``cost (N)`` is least, in at most *most* steps."""
+    """Move the rows first … last of ``q (N, n)`` to where their ``cost (N)`` is least, in at most *most* steps.
+
+    The cost is zero where all errors are within ``box (R)``.
+    """
     n = lower.shape[0]
     rows = box.shape[0]
     x, before, step, value = np.zeros(n * L), np.zeros(n * L), np.zeros(n * L), np.empty(L)
@@ -41,6 +44,7 @@ def descend_tree(tree, tasks, data, box, scale, lower, upper, most, first, last,
             box_rows(e, box, scale, total, inside)
             working = False
             for l in range(L):
+                total[l] = 0.0 if inside[l] != 0.0 else total[l]
                 gain = lowest[l] - total[l]
                 if gain >= 0.0:
                     idle[l] = idle[l] + 1.0 if gain < REST * total[l] else 0.0
