@@ -19,6 +19,25 @@ def scara(l1, l2, t1, t2):
     return J
 
 
+def test_example_1_21_scara():
+    """The printed spatial Jacobian, from a robot with the axes that the script reads off."""
+    from apprehend.robots.description import Description, Joint, JointLimits, JointType, Link
+
+    l1, l2 = 0.35, 0.25
+    at = [np.zeros(3), np.array([0, l1, 0]), np.array([0, l2, 0]), np.zeros(3)]
+    joints = []
+    for i, (kind, p) in enumerate(zip([JointType.REVOLUTE] * 3 + [JointType.PRISMATIC], at, strict=True)):
+        T = np.eye(4)
+        T[:3, 3] = p
+        limits = JointLimits(-3.0, 3.0, 1.0, 1.0, 1.0)
+        joints.append(Joint(f"joint_{i}", kind, f"link_{i}", f"link_{i + 1}", T, np.array([0.0, 0, 1]), limits))
+    links = {f"link_{i}": Link(f"link_{i}") for i in range(5)}
+    robot = ap.Robot(Description("scara", "link_0", links, tuple(joints)))
+    for q in np.random.default_rng(0).uniform(-1.0, 1.0, (5, 4)):
+        found = robot.jacobian(q, "link_4", "spatial")
+        np.testing.assert_allclose(found, scara(l1, l2, q[0], q[1]), atol=1e-15)
+
+
 def adjoint_inverse(R, p):
     P = np.array([[0, -p[2], p[1]], [p[2], 0, -p[0]], [-p[1], p[0], 0]])
     A = np.zeros((6, 6))
@@ -56,6 +75,15 @@ def box_in_two_scaras(model):
 def test_example_2_15_two_scaras():
     grasp, J, printed = box_in_two_scaras(ContactModel.SOFT)
     np.testing.assert_allclose(J[:3, :4], printed, atol=1e-15)
+    r, b, l1, l2, t1, t2 = 0.1, 0.5, 0.35, 0.25, 0.4, 0.7
+    c1, c12, s1, s12 = np.cos(t1), np.cos(t1 + t2), np.sin(t1), np.sin(t1 + t2)
+    second = [
+        [b - r, b - r + l1 * c1, b - r + l1 * c1 + l2 * c12, 0],
+        [0, 0, 0, 1],
+        [0, -l1 * s1, -l1 * s1 - l2 * s12, 0],
+        [0, 0, 0, 0],
+    ]
+    np.testing.assert_allclose(J[4:, 4:], second, atol=1e-15)
     np.testing.assert_allclose(J[3], 0.0, atol=1e-15)  # no finger turns about its contact normal
     held = HandGrasp(grasp, J)
     assert grasp.force_closure().success
@@ -121,6 +149,67 @@ def test_jacobian_equals_finite_differences_and_keeps_power():
     # one motor cannot move the object freely, but closing is a motion it can make
     assert not held.manipulable
     assert held.joint_velocity(np.zeros(6))[1] == pytest.approx(0.0)
+
+
+def test_forces_and_velocities_both_ways():
+    """Going there and back through the four maps of G 2.6."""
+    rng = np.random.default_rng(0)
+    grasp = random_grasp(rng, 3)
+    J = rng.normal(size=(9, 12))
+    held = HandGrasp(grasp, J)
+    assert held.manipulable
+    V = rng.normal(size=(4, 6))
+    rates, left = held.joint_velocity(V)
+    np.testing.assert_allclose(left, 0.0, atol=1e-12)
+    back, slip = held.object_twist(rates)
+    np.testing.assert_allclose(back, V, atol=1e-10)
+    np.testing.assert_allclose(slip, 0.0, atol=1e-10)
+    f = rng.normal(size=(4, 9))
+    again, left = held.contact_forces(held.torques(f))
+    np.testing.assert_allclose(again, f, atol=1e-10)
+    np.testing.assert_allclose(left, 0.0, atol=1e-10)
+    # power is the same everywhere: joints, contacts, object
+    np.testing.assert_allclose(
+        (held.torques(f) * rates).sum(axis=1), (grasp.object_wrench(f) * V).sum(axis=1), atol=1e-10
+    )
+    # torques on internal motions meet no contact
+    idle = held.internal_motions[:, 0]
+    force, left = held.contact_forces(idle)
+    np.testing.assert_allclose(force, 0.0, atol=1e-10)
+    assert left == pytest.approx(1.0)
+    slipping = held.object_twist(np.linalg.pinv(J) @ grasp.null_space[:, 0])[1]
+    assert slipping > 0.1
+
+
+def test_measures_of_the_hand():
+    rng = np.random.default_rng(1)
+    grasp = Grasp(random_grasp(rng, 3).contacts, length=0.5)
+    held = HandGrasp(grasp, rng.normal(size=(9, 10)))
+    W = np.diag([1.0, 1, 1, 0.5, 0.5, 0.5])
+    H = W @ np.linalg.pinv(grasp.matrix.T) @ held.jacobian
+    s = np.linalg.svd(H, compute_uv=False)
+    assert held.quality() == pytest.approx(s[-1])
+    assert held.quality("manipulability") == pytest.approx(np.sqrt(np.linalg.det(H @ H.T)))
+    assert held.quality("uniformity") == pytest.approx(s[-1] / s[0])
+    d = rng.normal(size=6)
+    unit = W @ d / np.linalg.norm(W @ d)
+    want = 1.0 / np.sqrt(unit @ np.linalg.inv(H @ H.T) @ unit)
+    assert held.quality("transmission", direction=d) == pytest.approx(want)
+    one = HandGrasp(grasp, np.outer(np.ones(9), [1.0]))
+    assert one.quality("transmission", direction=d) == 0.0
+    assert one.quality() == 0.0
+    low, high = np.full(10, -1.0), np.full(10, 3.0)
+    assert held.quality("joint_centring", q=np.ones(10), lower=low, upper=high) == 0.0
+    assert held.quality("joint_centring", q=high, lower=low, upper=high) == 1.0
+    for kind, options, message in (
+        ("beauty", {}, "kind is 'beauty'"),
+        ("transmission", {}, "needs direction"),
+        ("transmission", {"direction": np.zeros(6)}, "not all zero"),
+        ("uniformity", {"q": 1}, "does not take q"),
+        ("joint_centring", {"q": low, "lower": low, "upper": low}, "upper must be above lower"),
+    ):
+        with pytest.raises(InputError, match=message):
+            held.quality(kind, **options)
 
 
 def test_bad_hands_are_named():

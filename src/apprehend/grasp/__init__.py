@@ -8,6 +8,7 @@ from .files import read_grasp
 from .forces import ContactForces, ForceBatch, ForceStatus
 from .grasp import Grasp
 from .hand_grasp import HandGrasp, hand_jacobian
+from .immobility import Immobility, ImmobilityStatus
 from .jaw_plan import plan
 from .limits import Limits
 from .patch import Patch
@@ -30,6 +31,8 @@ __all__ = [
     "GraspPlan",
     "HandCandidate",
     "HandGrasp",
+    "Immobility",
+    "ImmobilityStatus",
     "Limits",
     "Patch",
     "PlanStatus",

@@ -17,6 +17,7 @@ from .ball import Generators
 from .closure import Closure, force_closure, form_closure
 from .contact import Contact, ContactModel
 from .forces import ContactForces, ForceBatch, contact_forces
+from .immobility import Immobility, immobility
 from .limits import Limits, with_torques
 from .patch import Patch
 from .program import ContactCone, contact_cone
@@ -227,6 +228,10 @@ class Grasp:
     def form_closure(self) -> Closure:
         """Whether the contacts hold the body without friction: see `closure.form_closure`."""
         return form_closure(self)
+
+    def immobility(self) -> Immobility:
+        """Which motions the contacts leave the body if they do not move and have no friction: see `immobility`."""
+        return immobility(self)
 
     def removable(self) -> tuple[int, ...]:
         """Indices of contacts (of *parts*, where there are patches) any one of which the grasp can lose and stay

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, as_array, as_pose, as_shaped
+from ..arrays import Array, as_array, as_pose, as_shaped, choice
 from ..errors import InputError
 from ..kinematics import Hand, Robot
 from .grasp import RANK_TOLERANCE, Grasp
@@ -88,6 +88,72 @@ class HandGrasp:
         out: Array = as_shaped(joint_velocity, "joint_velocity", self.jacobian.shape[1]) @ self.jacobian.T
         return out
 
+    def object_twist(self, joint_velocity: ArrayLike) -> tuple[Array, Array]:
+        """The smallest object twist V ``(..., p)`` that comes closest to following joint rates ``(..., n)``, and what
+        is left of ``J_H θ̇ = Gᵗ V``, as a norm ``(...)``: zero if no contact slips or is lost."""
+        moving = self.contact_velocity(joint_velocity)
+        twist = moving @ np.linalg.pinv(self.grasp.matrix.T, rcond=RANK_TOLERANCE).T
+        return twist, np.linalg.norm(self.grasp.contact_velocity(twist) - moving, axis=-1)
+
+    def contact_forces(self, torques: ArrayLike) -> tuple[Array, Array]:
+        """The smallest contact forces f ``(..., m)`` that come closest to what joint torques ``(..., n)`` exert, and
+        what is left of ``τ = J_Hᵗ f``, as a norm ``(...)``: torques that work on internal motions meet no contact.
+
+        Structural forces may be added freely; friction cones are not looked at (`Grasp.contact_forces` does).
+        """
+        tau = as_shaped(torques, "torques", self.jacobian.shape[1])
+        f = tau @ np.linalg.pinv(self.jacobian.T, rcond=RANK_TOLERANCE).T
+        return f, np.linalg.norm(self.torques(f) - tau, axis=-1)
+
+    @cached_property
+    def object_jacobian(self) -> Array:
+        """H ``(p, n)``: ``V = H θ̇`` where the grasp condition holds, ``H = (Gᵗ)⁺ J_H``."""
+        H: Array = np.linalg.pinv(self.grasp.matrix.T, rcond=RANK_TOLERANCE) @ self.jacobian
+        return H
+
+    def quality(self, kind: str = "singular_distance", **options: Any) -> float:
+        """The measures of the hand's configuration in the review of Roa and Suárez (2015).
+
+        Of the hand-object Jacobian H (angles times `Grasp.length`): ``"singular_distance"`` its smallest singular
+        value, ``"manipulability"`` √det HHᵗ, the product of them, ``"uniformity"`` smallest over largest.
+        ``"transmission"`` (*direction* ``(p,)``, a twist): the largest rate along it for joint rates of norm one,
+        ``(dᵗ (H Hᵗ)⁻¹ d)^{-1/2}``, zero if it cannot be made. ``"joint_centring"`` (*q*, *lower*, *upper* ``(n,)``):
+        the mean of ``((q − middle) / half range)²``, 0 in the middle, 1 at the limits.
+        """
+        choice(kind, "kind", ("singular_distance", "manipulability", "uniformity", "transmission", "joint_centring"))
+        if kind == "joint_centring":
+            n = self.jacobian.shape[1]
+            q, low, high = (as_shaped(_need(options, name, kind), name, n) for name in ("q", "lower", "upper"))
+            if not (high > low).all():
+                raise InputError("upper must be above lower for every joint")
+            _no_more(options, kind)
+            return float((((2.0 * q - low - high) / (high - low)) ** 2).mean())
+        weight = np.append(
+            np.ones(self.grasp.dimension), np.full(self.grasp.wrench_size - self.grasp.dimension, self.grasp.length)
+        )
+        H = weight[:, None] * self.object_jacobian
+        if kind == "transmission":
+            d = as_array(_need(options, "direction", kind), "direction")
+            if d.shape != (len(H),) or not d.any():
+                raise InputError(f"direction has shape {d.shape}; expected a twist ({len(H)},), not all zero")
+            _no_more(options, kind)
+            d = weight * d / np.linalg.norm(weight * d)
+            U, s, _ = np.linalg.svd(H, full_matrices=True)
+            full = np.zeros(len(H))
+            full[: len(s)] = s
+            good = full > RANK_TOLERANCE * max(float(full[0]), 1e-300)
+            parts = U.T @ d
+            if np.abs(parts[~good]).max(initial=0.0) > 1e-9:
+                return 0.0
+            return float(1.0 / np.linalg.norm(parts[good] / full[good]))
+        _no_more(options, kind)
+        s = np.zeros(len(H))
+        found = np.linalg.svd(H, compute_uv=False)
+        s[: len(found)] = found[: len(H)]
+        if kind == "manipulability":
+            return float(np.prod(s))
+        return float(s[-1]) if kind == "singular_distance" else float(s[-1] / s[0]) if s[0] > 0.0 else 0.0
+
     def joint_velocity(self, twist: ArrayLike) -> tuple[Array, Array]:
         """The smallest θ̇ ``(..., n)`` that comes closest to moving the object with *twist* ``(..., p)``, and what is
         left of the grasp condition ``J_H θ̇ = Gᵗ V`` (eq. 2.1), as a norm ``(...)``."""
@@ -142,3 +208,14 @@ class HandGrasp:
             Row("structural forces", "f ∈ 𝒩(J_Hᵗ)", structural > 0, structural),
             Row("loose object motions", "V ∈ 𝒩(Gᵗ)", loose > 0, loose),
         )
+
+
+def _no_more(options: dict[str, Any], kind: str) -> None:
+    if options:
+        raise InputError(f"quality {kind!r} does not take {', '.join(options)}")
+
+
+def _need(options: dict[str, Any], name: str, kind: str) -> Any:
+    if name not in options:
+        raise InputError(f"quality {kind!r} needs {name}")
+    return options.pop(name)
