@@ -81,7 +81,9 @@ def test_mjcf_round_trip(tmp_path: Path, name: str) -> None:
     save_mjcf(a, tmp_path / "r.xml", meshes="omit")
     b = load_description(tmp_path / "r.xml")
     same(a, b, limits=("lower", "upper", "effort"))
-    assert [(t.name, dict(t.arms)) for t in b.tendons] == [(t.name, dict(t.arms)) for t in a.tendons]
+    pulled = {f"{x.name}_tendon" for x in a.actuators if len(x.arms) > 1}  # MJCF drives several joints by a tendon
+    kept = [(t.name, dict(t.arms)) for t in b.tendons if t.name not in pulled]
+    assert kept == [(t.name, dict(t.arms)) for t in a.tendons]
     assert {x.name: dict(x.arms) for x in b.actuators} == {x.name: dict(x.arms) for x in a.actuators}
 
 

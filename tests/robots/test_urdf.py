@@ -343,7 +343,11 @@ def test_transmissions_are_motors() -> None:
 
 @pytest.mark.parametrize(
     ("ratio", "said"),
-    [("0", "mechanicalReduction is 0; expected the ratio"), ("x", "mechanicalReduction is 'x'; expected a number")],
+    [
+        ("0", "mechanicalReduction is 0; expected the ratio"),
+        ("inf", "is inf; expected the ratio"),
+        ("x", "mechanicalReduction is 'x'; expected a number"),
+    ],
 )
 def test_reductions_that_mean_nothing(ratio: str, said: str) -> None:
     text = two_links('<limit lower="0" upper="1"/>').replace(
@@ -351,6 +355,33 @@ def test_reductions_that_mean_nothing(ratio: str, said: str) -> None:
     )
     with pytest.raises(DescriptionError, match=said):
         parse_urdf(text)
+
+
+def geared(tag: str, name: str, role: int, ratio: float) -> str:
+    role_text = f"<role>{tag}{role}</role>"
+    return f'<{tag} name="{name}">{role_text}<mechanicalReduction>{ratio}</mechanicalReduction></{tag}>'
+
+
+@pytest.mark.parametrize(
+    ("kind", "arms"),
+    [
+        ("DifferentialTransmission", [{"i": 3.0 * 2.0, "j": 3.0 * -5.0}, {"i": 7.0 * 2.0, "j": 7.0 * 5.0}]),
+        ("FourBarLinkageTransmission", [{"i": 3.0 * 2.0}, {"i": 7.0, "j": 7.0 * -5.0}]),
+    ],
+)
+def test_coupled_transmissions_have_the_arms_of_their_speeds(kind: str, arms: list[dict[str, float]]) -> None:
+    limit = '<limit lower="-1" upper="1"/>'
+    parts = (
+        geared("joint", "j", 2, -5.0) + geared("actuator", "m2", 2, 7.0)
+        + geared("joint", "i", 1, 2.0) + geared("actuator", "m1", 1, 3.0)
+    )  # fmt: skip
+    text = f'<transmission name="t"><type>transmission_interface/{kind}</type>{parts}</transmission>'
+    chain = (joint("i", "a", "b", inner=limit), joint("j", "b", "c", inner=limit))
+    d = parse_urdf(robot(*(link(n) for n in "abc"), *chain, text))
+    assert [(a.name, dict(a.arms)) for a in d.actuators] == [("m1", arms[0]), ("m2", arms[1])]
+    torn = parse_urdf(robot(*(link(n) for n in "abc"), *chain, text.replace(geared("actuator", "m1", 1, 3.0), "")))
+    assert not torn.actuators
+    assert "transmission 't' has 2 joints and 1 actuators; left it out" in problems(torn)
 
 
 def test_a_closed_chain_can_be_cut() -> None:
