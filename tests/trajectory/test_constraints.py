@@ -52,6 +52,39 @@ def test_torques_stay_within_limits_at_all_times(robot: ap.Robot, seed: int) -> 
     assert used.max() > 0.9 or timing.duration == pytest.approx(free.duration, rel=1e-2)
 
 
+@pytest.mark.parametrize("kind", ["torque", "power", "speed", "acceleration"])
+@pytest.mark.parametrize("grid", [20, 150])
+def test_the_proven_violation_is_zero_and_true(robot: ap.Robot, kind: str, grid: int) -> None:
+    """On coarse and fine grids, for cubics and quintics: what is proven holds at times that no sample saw."""
+    frame = tool(robot)
+    still = np.abs(robot.gravity(spline(robot, 8)(np.linspace(0.0, 1.0, 300)))).max(axis=0)
+    effort = np.maximum(0.35 * robot.limits.effort, 1.5 * still)
+    constraint = {
+        "torque": lambda: tj.TorqueLimits(robot, effort),
+        "power": lambda: tj.PowerLimits(robot, 12.0),
+        "speed": lambda: tj.CartesianSpeed(robot, frame, linear=0.3, angular=0.7),
+        "acceleration": lambda: tj.CartesianAcceleration(robot, frame, linear=1.0, angular=3.0),
+    }[kind]()
+    for path in (spline(robot, 8), tj.rounded(spline(robot, 8).waypoints, 0.2)):
+        timing = tj.time_optimal(path, limits(robot), constraints=[constraint], grid=grid).require_success()
+        assert timing.proven
+        assert timing.violation <= 1e-9
+        motion = timing.motion
+        t = np.linspace(0.0, motion.duration, 20011)
+        q, v, a = motion(t), motion(t, 1), motion(t, 2)
+        if kind in ("torque", "power"):
+            torque = robot.inverse_dynamics(q, v, a)
+            used = np.abs(torque) / effort if kind == "torque" else np.abs(torque * v) / 12.0
+        else:
+            values = np.einsum("mij,mj->mi", robot.jacobian(q, frame), v)
+            bounds = (0.3, 0.7)
+            if kind == "acceleration":
+                values, bounds = ap.kinematics.acceleration(robot, q, v, a, frame), (1.0, 3.0)
+            used = np.linalg.norm(values.reshape(-1, 2, 3), axis=-1) / bounds
+        assert used.max() <= 1.0 + 1e-9
+        assert used.max() > 0.9 or (np.abs(v) / robot.limits.velocity).max() > 0.99
+
+
 def test_torques_recomputed_by_pinocchio() -> None:
     pin = pytest.importorskip("pinocchio")
     robot = ap.Robot.load("ur5")

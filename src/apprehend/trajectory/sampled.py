@@ -28,7 +28,7 @@ class Sampled:
 
     ``samples (N, 5, E, 3)`` and Bernstein coefficients ``values (N, 5, E, 3)`` of A, B, C; ``bounds (N, E, 2)``;
     ``error (N, E, 3)`` bounds of what A, B, C differ from the quartics, ``rest (N, E, 3)`` the part of it that values
-    and bounds do not hold yet (rows that are bounded on one side hold that of B and C). ``across (N, E, 2)`` as in
+    do not hold yet (rows that are bounded on one side hold that of B and C). ``across (N, E, 2)`` as in
     `Rows`; ``power (E,)`` marks rows whose upper bound is divided by the path speed; ``proven`` says that no error is
     an estimate.
     """
@@ -147,12 +147,11 @@ def sample(path: PolynomialPath, grid: Array, constraints: Sequence[Constraint])
 
 
 def _held(found: Sampled) -> Sampled:
-    """With the errors of B and C of one-sided rows in their values and bounds: exact, since x ≥ 0."""
+    """With the errors of B and C of one-sided rows in their values: exact, since x ≥ 0."""
     values, bounds, rest = found.values, found.bounds, found.error.copy()
     for side, sign in ((1, 1.0), (0, -1.0)):
         rows = np.isinf(bounds[0, :, 1 - side]) & np.isfinite(bounds[0, :, side])
-        values[:, :, rows, 1] += sign * found.error[:, None, rows, 1]
-        bounds[:, rows, side] -= sign * found.error[:, rows, 2]
+        values[:, :, rows, 1:] += sign * found.error[:, None, rows, 1:]
         rest[:, rows, 1:] = 0.0
     return replace(found, rest=rest)
 
