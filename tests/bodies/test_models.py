@@ -56,7 +56,8 @@ def test_simple_shapes_enclose_the_body_and_state_their_excess(name: str, kind: 
     assert deviation.volume_excess > 0.0
     union = SurfaceMesh(*model.mesh)
     assert union.closed
-    assert union.volume == pytest.approx(model.volume, rel=1e-9)
+    assert union.volume <= model.volume * (1 + 1e-9)
+    assert union.volume == pytest.approx(model.volume, rel=0.02)
 
 
 def test_a_solid_stays_enclosed_when_it_is_cut() -> None:
@@ -90,6 +91,7 @@ def test_shapes_of_known_solids_are_found() -> None:
     assert np.allclose(aligned.poses[0, :3, :3], np.eye(3))
     assert aligned.volume > 1.5 * model.volume
     ball = Body.sphere(0.04).spheres(1)
+    assert ball.volume == pytest.approx(4.0 / 3.0 * np.pi * ball.radii[0] ** 3)
     assert ball.radii[0] == pytest.approx(0.04, rel=0.01)
     rod = Body.cylinder(0.01, 0.3).capsules(1)
     assert rod.radii[0] == pytest.approx(0.01, rel=0.02)
@@ -213,7 +215,7 @@ def test_saved_models_come_back(kind: str, tmp_path: Path) -> None:
     points = inner_points(body, 200)
     assert np.array_equal(model.inside(points), back.inside(points))
     mesh = SurfaceMesh.load(model.save(tmp_path / "model.stl"))
-    assert SurfaceMesh(*model.mesh).volume == pytest.approx(abs(mesh.volume) or model.volume, rel=1e-3)
+    assert np.allclose(np.ptp(mesh.vertices, axis=0), np.ptp(model.mesh[0], axis=0), rtol=1e-5)
     with pytest.raises(MeshError, match=r"'\.txt' is not a mesh format"):
         model.save(tmp_path / "model.txt")
     with pytest.raises(InputError, match=r"expected a '(boxes|spheres)'"):

@@ -7,6 +7,7 @@ import pytest
 
 from apprehend import Body
 from apprehend.bodies import MeshIndex, shapes
+from apprehend.bodies.convex import point_triangle_squared
 from apprehend.bodies.repair import solid_angles
 from apprehend.errors import InputError
 from tests.support import reference
@@ -41,6 +42,19 @@ def test_a_box_has_its_closed_form() -> None:
     assert near.points.shape == (40, 50, 3)
     assert near.faces.shape == near.distance.shape == (40, 50)
     assert np.allclose(np.linalg.norm(points - near.points, axis=-1), near.distance, atol=1e-12)
+
+
+def test_many_points_have_the_same_answers_as_few() -> None:
+    """Large batches are answered on lanes, in another order."""
+    body = Body.household("mug")
+    points = np.random.default_rng(1).uniform(body.bounds[0] - 0.05, body.bounds[1] + 0.05, (5003, 3))
+    together = body.closest_point(points)
+    apart = [body.closest_point(points[i : i + 1000]) for i in range(0, 5003, 1000)]
+    assert np.abs(together.distance - np.concatenate([a.distance for a in apart])).max() < 1e-15
+    assert np.allclose(np.linalg.norm(points - together.points, axis=1), together.distance, atol=1e-15)
+    assert np.sqrt(point_triangle_squared(points, body.triangles[together.faces])) == pytest.approx(together.distance)
+    one = np.zeros((4096, 3))
+    assert np.ptp(body.closest_point(one).distance) == 0.0
 
 
 def sum_of_angles(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -80,7 +80,7 @@ def farthest_of_solid(model: Distance, low: Array, high: Array, body: Distance) 
         open_ = away + reach > lower + FINE * extent
         upper = float((away + reach)[open_].max(initial=lower + FINE * extent))
         centres = centres[open_]
-        if not len(centres) or spent + 8 * len(centres) > MOST:
+        if not len(centres) or spent + 4 * len(centres) > MOST:
             return lower, upper
         centres = (centres[:, None] + half * step).reshape(-1, 3)
         half *= 0.5

@@ -72,7 +72,7 @@ class DistanceField:
         winding.scan(index.tree.triangles, origin, float(resolution), values)
         if index.caps is not None:
             winding.scan(index.caps[0].triangles, origin, float(resolution), values)
-        rows = kernels.frames(index.tree.triangles)
+        rows = index.frames
 
         def signs(a: int, b: int) -> None:
             winding.accumulate(values, a, b)

@@ -9,12 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, BoolArray, IntArray, as_shaped
+from ..kernels import distance_field as kernels
 from ..kernels import rays, winding
 from ..parallel import over_ranges
 from . import topology
 
 GRAIN = 256
 """Points that are worth a thread of their own."""
+
+MANY = 4096
+"""Points from which on it pays to sort them and to look for their nearest triangles on lanes."""
 
 
 class Nearest(NamedTuple):
@@ -43,6 +47,11 @@ class MeshIndex:
         self.tree = rays.Tree(*rays.build(np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int64)))
 
     @cached_property
+    def frames(self) -> Array:
+        """Every triangle of the tree in a frame of its own (`kernels.distance_field.frames`)."""
+        return np.asarray(kernels.frames(self.tree.triangles))
+
+    @cached_property
     def caps(self) -> tuple[rays.Tree, Array] | None:
         """The fans over the rims of holes: their tree and its dipoles; None for a closed mesh."""
         if topology.is_closed(self.faces):
@@ -69,9 +78,16 @@ class MeshIndex:
         p = as_shaped(points, "points", 3)
         flat = p.reshape(-1, 3)
         out, distance, faces = np.empty_like(flat), np.empty(len(flat)), np.empty(len(flat), np.int64)
-        over_ranges(
-            lambda a, b: rays.nearest(self.tree, flat[a:b], out[a:b], distance[a:b], faces[a:b]), len(flat), GRAIN
-        )
+        if len(flat) < MANY:
+            over_ranges(
+                lambda a, b: rays.nearest(self.tree, flat[a:b], out[a:b], distance[a:b], faces[a:b]), len(flat), GRAIN
+            )
+        else:
+            order, rows = _along_a_curve(flat), self.frames
+            over_ranges(
+                lambda a, b: kernels.nearest(self.tree, rows, flat, order, out, distance, faces, a, b),
+                -(-len(flat) // kernels.RUN),
+            )
         shape = p.shape[:-1]
         return Nearest(out.reshape(p.shape), distance.reshape(shape), faces.reshape(shape))
 
@@ -106,3 +122,14 @@ class MeshIndex:
         """Distance ``(...)`` of *points* ``(..., 3)`` from the surface in m, negative inside."""
         distance = self.nearest(points).distance
         return np.where(self.inside(points), -distance, distance)
+
+
+def _along_a_curve(points: Array) -> IntArray:
+    """The order of ``points (N, 3)`` along a Z-curve of 1024 cells a side, on which neighbours are near each other."""
+    low = points.min(axis=0)
+    cell = ((points - low) * (1023.0 / max(float(np.ptp(points, axis=0).max()), 1e-300))).astype(np.int64)
+    key = np.zeros(len(points), np.int64)
+    for bit in range(10):
+        for k in range(3):
+            key |= ((cell[:, k] >> bit) & 1) << (3 * bit + k)
+    return np.argsort(key, kind="stable").astype(np.int64)

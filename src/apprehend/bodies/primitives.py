@@ -95,8 +95,13 @@ class Primitives(ABC):
 
     @cached_property
     def volume(self) -> float:
-        """Volume of `union` in m³."""
-        return mass.solid(*self.union).volume
+        """Volume of the union in m³: that of `union`, enlarged by what the polyhedra of round shapes lack."""
+        meshes = sum(mass.solid(*mesh).volume for mesh in self.meshes())
+        return mass.solid(*self.union).volume * (float(self._volumes().sum()) / meshes if meshes > 0.0 else 1.0)
+
+    def _volumes(self) -> Array:
+        """Volume of each shape ``(k,)``."""
+        return np.array([mass.solid(*mesh).volume for mesh in self.meshes()])
 
     def deviation(self, body: MeshIndex) -> Deviation:
         """How much the model differs from *body* (see `Deviation`)."""
@@ -199,6 +204,9 @@ class Spheres(Primitives):
             best = np.minimum(best, np.linalg.norm(points - centre, axis=1) - radius)
         return best
 
+    def _volumes(self) -> Array:
+        return np.asarray(4.0 / 3.0 * np.pi * self.radii**3)
+
     def at(self, pose: ArrayLike) -> Self:
         """The same spheres moved by *pose* ``(4, 4)``."""
         T = as_pose(pose, "pose")
@@ -248,6 +256,9 @@ class Capsules(Primitives):
             t = np.clip(to @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
             best = np.minimum(best, np.linalg.norm(to - t[:, None] * along, axis=1) - radius)
         return best
+
+    def _volumes(self) -> Array:
+        return np.array([fit.capsule_volume(fit.Capsule(*each)) for each in zip(self.ends, self.radii)])
 
     def at(self, pose: ArrayLike) -> Self:
         """The same capsules moved by *pose* ``(4, 4)``."""

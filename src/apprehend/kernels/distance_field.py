@@ -13,9 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .rays import DEPTH, push_nearer_last
+from .rays import DEPTH, _nearest_on_triangle, push_nearer_last
 
 LANES = 16
+RUN = 1024
+"""Points that `nearest` looks up one after another."""
 
 
 class Field(NamedTuple):
@@ -213,6 +215,31 @@ def _reaches(box, px, py, pz, best):
 
 
 @kernel
+def _descend(tree, rows, px, py, pz, best, owner, centre, stack, lower):
+    """Squared distances and nearest triangles of all lanes, starting from the *owner* of the first and the last one."""
+    one, two = owner[0], owner[LANES - 1]
+    for l in range(LANES):
+        best[l] = np.inf
+    _closer(rows[one], one, px, py, pz, best, owner)
+    if two != one:
+        _closer(rows[two], two, px, py, pz, best, owner)
+    stack[0] = 0
+    top = 1
+    while top:
+        top -= 1
+        node = stack[top]
+        if not _reaches(tree.boxes[node], px, py, pz, best):
+            continue
+        start = tree.children[node, 0]
+        if start >= 0:
+            top = push_nearer_last(tree, node, centre, stack, lower, top)
+            continue
+        start = -start - 1
+        for t in range(start, start + tree.children[node, 1]):
+            _closer(rows[t], t, px, py, pz, best, owner)
+
+
+@kernel
 def fill(tree, rows, origin, spacing, values, first, last):
     """Turn winding numbers on the grid into signed distances: ``values`` (float32), pairs of layers first ≤ b < last.
 
@@ -221,10 +248,10 @@ def fill(tree, rows, origin, spacing, values, first, last):
     nx, ny, nz = values.shape
     px, py, pz = np.empty(LANES), np.empty(LANES), np.empty(LANES)
     best, owner = np.empty(LANES), np.zeros(LANES, np.int64)
-    centre = np.empty(3)
-    stack, lower = np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    centre, stack, lower = np.empty(3), np.empty(DEPTH, np.int64), np.empty(DEPTH)
     columns, runs = (ny + 1) // 2, (nz + 3) // 4
     for b in range(first, last):
+        owner[:] = 0  # each layer for itself, so that the result does not depend on the range
         for column in range(columns):
             for step in range(runs):
                 run = step if column % 2 == 0 else runs - 1 - step  # back and forth, so that neighbours follow
@@ -232,33 +259,41 @@ def fill(tree, rows, origin, spacing, values, first, last):
                     px[l] = origin[0] + spacing * min(2 * b + l // 8, nx - 1)
                     py[l] = origin[1] + spacing * min(2 * column + (l // 4) % 2, ny - 1)
                     pz[l] = origin[2] + spacing * min(4 * run + l % 4, nz - 1)
-                    best[l] = np.inf
-                one, two = owner[0], owner[LANES - 1]
-                _closer(rows[one], one, px, py, pz, best, owner)
-                if two != one:
-                    _closer(rows[two], two, px, py, pz, best, owner)
-                centre[0], centre[1], centre[2] = (
-                    0.5 * (px[0] + px[LANES - 1]), 0.5 * (py[0] + py[LANES - 1]), 0.5 * (pz[0] + pz[LANES - 1])
-                )  # fmt: skip
-                stack[0] = 0
-                top = 1
-                while top:
-                    top -= 1
-                    node = stack[top]
-                    if not _reaches(tree.boxes[node], px, py, pz, best):
-                        continue
-                    start = tree.children[node, 0]
-                    if start >= 0:
-                        top = push_nearer_last(tree, node, centre, stack, lower, top)
-                        continue
-                    start = -start - 1
-                    for t in range(start, start + tree.children[node, 1]):
-                        _closer(rows[t], t, px, py, pz, best, owner)
+                centre[0] = 0.5 * (px[0] + px[LANES - 1])
+                centre[1] = 0.5 * (py[0] + py[LANES - 1])
+                centre[2] = 0.5 * (pz[0] + pz[LANES - 1])
+                _descend(tree, rows, px, py, pz, best, owner, centre, stack, lower)
                 for l in range(LANES):
                     i, j, k = 2 * b + l // 8, 2 * column + (l // 4) % 2, 4 * run + l % 4
                     if i < nx and j < ny and k < nz:
                         d = math.sqrt(best[l])
                         values[i, j, k] = -d if values[i, j, k] > 0.5 else d
+
+
+@kernel(fast=False)
+def nearest(tree, rows, points, order, out, distance, faces, first, last):
+    """`rays.nearest` on lanes: for runs first ≤ r < last of `RUN` points that follow each other in *order*.
+
+    The better neighbours in *order* are neighbours in space, the faster.
+    """
+    px, py, pz = np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    best, owner = np.empty(LANES), np.zeros(LANES, np.int64)
+    centre, stack, lower = np.empty(3), np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    count = order.shape[0]
+    for b in range(first * RUN // LANES, min(last * RUN, count + LANES - 1) // LANES):
+        if b % (RUN // LANES) == 0:
+            owner[:] = 0  # each run for itself, so that the result does not depend on the range
+        centre[:] = 0.0
+        for l in range(LANES):
+            n = order[min(LANES * b + l, count - 1)]
+            px[l], py[l], pz[l] = points[n, 0], points[n, 1], points[n, 2]
+            for k in range(3):
+                centre[k] += points[n, k] / LANES
+        _descend(tree, rows, px, py, pz, best, owner, centre, stack, lower)
+        for l in range(min(LANES, count - LANES * b)):
+            n = order[LANES * b + l]
+            distance[n] = math.sqrt(_nearest_on_triangle(points[n], tree.triangles[owner[l]], out[n]))
+            faces[n] = tree.order[owner[l]]
 
 
 @kernel
