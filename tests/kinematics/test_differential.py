@@ -11,6 +11,8 @@ from apprehend.kinematics import (
     Robot,
     StaticsStatus,
     acceleration,
+    com_jacobian,
+    com_jacobian_derivative,
     frame_wrench,
     joint_torques,
     leaf_to_root_jacobian,
@@ -82,6 +84,28 @@ def test_rate_of_the_rpy_jacobian_is_its_difference(seed: int) -> None:
     np.testing.assert_allclose(dJ, slope, rtol=1e-6, atol=1e-6)
     one, rate = rpy_jacobian_derivative(robot, q[0], qd, frame)
     assert one.shape[-2:] == rate.shape[-2:] == (6, robot.n)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_jacobian_of_the_centre_of_mass_and_its_rate_are_differences(seed: int) -> None:
+    robot, _, rng = robot_of(seed)
+    q, qd = rng.normal(size=(2, 2, 3, robot.n))
+    J, dJ = com_jacobian_derivative(robot, q, qd)
+    np.testing.assert_allclose(com_jacobian(robot, q), J, atol=1e-13)
+    h = 1e-6
+    for i in range(robot.n):
+        d = h * np.eye(robot.n)[i]
+        np.testing.assert_allclose(J[..., i], (robot.com(q + d) - robot.com(q - d)) / (2 * h), atol=1e-8)
+    slope = (com_jacobian(robot, q + h * qd) - com_jacobian(robot, q - h * qd)) / (2 * h)
+    np.testing.assert_allclose(dJ, slope, atol=1e-8)
+
+
+def test_what_has_no_mass_has_no_centre() -> None:
+    with pytest.raises(InputError, match="robot 'planar_2r' has no mass"):
+        com_jacobian(Robot.load("planar_2r"), [0.0, 0.0])
+    robot, _, _ = robot_of(0)
+    with pytest.raises(InputError, match=r"q\[1\] is nan"):
+        com_jacobian(robot, [0.0, np.nan, *[0.0] * (robot.n - 2)])
 
 
 def test_rpy_jacobian_does_not_exist_at_the_lock() -> None:

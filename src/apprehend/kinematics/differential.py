@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..kernels import single as kernels
 from ..result import Result, Status
 from ..spatial import euler, se3, so3
+from . import dynamics
 
 if TYPE_CHECKING:
     from .robot import Robot
@@ -35,8 +36,8 @@ def jacobian_derivative(
     count = math.prod(shape)
     J, dJ = np.empty((2, count, 6, robot.n))
     T = np.empty((count, 4, 4))
-    as_shaped(rows, "q", robot.n)
-    as_shaped(rates, "qd", robot.n)
+    as_shaped(q, "q", robot.n)
+    as_shaped(qd, "qd", robot.n)
     kernels.chain_rates(robot.chain_model(frame), rows, rates, J, dJ, T)
     if reference != "spatial":
         V = np.einsum("nij,nj->ni", J, rates)
@@ -50,6 +51,46 @@ def jacobian_derivative(
             dJ[:, :3] -= Px @ dJ[:, 3:] + dPx @ J[:, 3:]
             J[:, :3] -= Px @ J[:, 3:]
     return J.reshape(*shape, 6, robot.n), dJ.reshape(*shape, 6, robot.n)
+
+
+def com_jacobian(robot: Robot, q: ArrayLike) -> Array:
+    """Jacobian ``(..., 3, n)`` of the centre of mass: ċ = J q̇.
+
+    Its row k is what holds the robot, per kg, if it falls along −k: the torques of a uniform acceleration.
+    """
+    check_mass(robot)
+    shape, (rows,) = robot.read_rows(q=q)
+    as_shaped(q, "q", robot.n)
+    out = np.empty((3, len(rows), robot.n))
+    for k in range(3):
+        dynamics.inverse_dynamics(robot.model, rows, dynamics.NONE, dynamics.NONE, out[k], -np.eye(3)[k])
+    return np.moveaxis(out / robot.mass, 0, 1).reshape(*shape, 3, robot.n)
+
+
+def com_jacobian_derivative(robot: Robot, q: ArrayLike, qd: ArrayLike) -> tuple[Array, Array]:
+    """`com_jacobian` and its time derivative along q̇, both ``(..., 3, n)``: of each link's centre r in its frame's axes
+    of the world, J_v − r̂ J_ω and J̇_v − r̂ J̇_ω − (ω × r)^ J_ω, weighted by mass.
+    """
+    check_mass(robot)
+    shape = np.broadcast_shapes(np.shape(q)[:-1], np.shape(qd)[:-1])
+    value, rate = np.zeros((2, *shape, 3, robot.n))
+    for name, link in robot.description.links.items():
+        if link.inertial is None or link.inertial.mass == 0.0 or not robot.chain(name):
+            continue
+        J, dJ = jacobian_derivative(robot, q, qd, name)
+        r = robot.fk(q, name)[..., :3, :3] @ link.inertial.com
+        turning = np.einsum("...ij,...j->...i", J[..., 3:, :], as_shaped(qd, "qd", robot.n))
+        share = link.inertial.mass / robot.mass
+        value += share * (J[..., :3, :] - so3.hat(r) @ J[..., 3:, :])
+        bent = so3.hat(np.cross(turning, r)) @ J[..., 3:, :]
+        rate += share * (dJ[..., :3, :] - so3.hat(r) @ dJ[..., 3:, :] - bent)
+    return value, rate
+
+
+def check_mass(robot: Robot) -> None:
+    """`InputError` if no link has a mass: there is no centre then."""
+    if robot.mass <= 0.0:
+        raise InputError(f"robot {robot.name!r} has no mass: its description gives no link an inertia")
 
 
 def velocity(robot: Robot, q: ArrayLike, qd: ArrayLike, frame: str, reference: str = "mixed") -> Array:

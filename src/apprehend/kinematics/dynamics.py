@@ -40,9 +40,9 @@ def each_range(work: Callable[[int, int], int], count: int, grain: int = GRAIN) 
     return min(bad, default=-1)
 
 
-def inverse_dynamics(model: TreeModel, q: Array, qd: Array, qdd: Array, out: Array) -> int:
+def inverse_dynamics(model: TreeModel, q: Array, qd: Array, qdd: Array, out: Array, gravity: Array = DOWN) -> int:
     """Torques by the recursive Newton–Euler algorithm; 4 row + input (1 q, 2 q̇, 3 q̈) of the first not finite, or −1."""
-    return each_range(lambda a, b: int(kernels.inverse_dynamics(model, q, qd, qdd, DOWN, a, b, out)), q.shape[0])
+    return each_range(lambda a, b: int(kernels.inverse_dynamics(model, q, qd, qdd, gravity, a, b, out)), q.shape[0])
 
 
 def mass_matrix(model: TreeModel, q: Array, out: Array) -> int:

@@ -310,8 +310,7 @@ class Robot:
 
     def com(self, q: ArrayLike) -> Array:
         """Centre of mass of the whole robot in the world, ``(..., 3)``; its mass is `mass`."""
-        if self.mass <= 0.0:
-            raise InputError(f"robot {self.name!r} has no mass: its description gives no link an inertia")
+        differential.check_mass(self)
         q = self._read(q)
         count = math.prod(q.shape[:-1])
         out = np.empty((count, 3))
