@@ -2,42 +2,24 @@
 
 A motion is cut into pieces; a piece is free if nothing in its middle is nearer than what can be moved in half of it.
 Spheres on lanes clear nearly all; for the pairs of nodes that they leave open the exact shapes are asked, and the plane
-that separates them bounds for how much of the motion they stay apart (`still_apart`).
+that separates them bounds for how much of the motion they stay apart (`lane_exact`).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from ._jit import kernel
-from .collide import CENTRE, DONE, CollideSpace, make_space, pair_gap
-from .gjk import AXIS, HALF_SPACE, difference
+from .collide import make_space
+from .lane_exact import QUEUE, EdgeSpace, settle
 from .lanes import LANES
-from .sphere import SphereSpace, carry_point, move_lanes, ready_node, sphere_space
-from .sphere_near import HALF_SPACE as NO_BOX
-from .sphere_near import at, near_fixed, near_grid, near_sphere
+from .sphere import carry_point, count_flags, hit_lanes, move_lanes, ready_node, sphere_space
+from .sphere_near import HALF_SPACE, at, near_fixed, near_grid, near_sphere
 
-QUEUE = 4096
 DEEP = QUEUE - 1024
 """With more pieces than this the last ones come first, so that the queue never overflows."""
-
-
-class EdgeSpace(NamedTuple):
-    """Scratch of one thread."""
-
-    exact: CollideSpace
-    lanes: SphereSpace
-    bounds: np.ndarray  # (K, 4): a ball around the bounding spheres of a node in all lanes
-    middle: np.ndarray  # (LANES,): middles of the pieces
-    state: np.ndarray  # (LANES,): 0 free all along the piece, 1 open, 2 hit in the middle
-    rates: np.ndarray  # (B + K,): of pairs of nodes, of nodes against the world
-    speed: np.ndarray  # (m,): of the joints along the motion
-    turning: np.ndarray  # (1,): sum of what revolute joints turn
-    queue: np.ndarray  # (QUEUE, 2): begin and end of pieces
-    order: np.ndarray  # (C,) int64: rows of ``meets``, the more often hit the earlier
 
 
 @kernel
@@ -102,148 +84,6 @@ def may_meet(bounds, k, fixed, o, more):
 
 
 @kernel
-def put_shapes(model, lanes, space, k, lane):
-    """Put the exact shapes of node *k* where they are in one lane; their poses follow on demand."""
-    L = LANES
-    carrier = lanes.parts[k, 0]
-    P, T = space.lanes.poses, space.exact.poses
-    shapes, floats = space.exact.shapes, model.shapes.floats
-    for c in range(12):
-        T[carrier, c] = P[carrier, c * L + lane]
-    for g in range(lanes.owns[k, 0], lanes.owns[k, 1]):
-        x, y, z = floats[g, 4], floats[g, 5], floats[g, 6]
-        for i in range(3):
-            shapes[g, CENTRE + i] = (
-                T[carrier, 3 * i] * x + T[carrier, 3 * i + 1] * y + T[carrier, 3 * i + 2] * z + T[carrier, 9 + i]
-            )
-        shapes[g, DONE] = 0.0
-
-
-@kernel
-def drift(lanes, space, carrier, both, lane, ball, r, nx, ny, nz):
-    """Motion along the unit vector n of the *ball* on *carrier*: of its centre, and what turning adds.
-
-    Per unit of the motion, in one lane; joints that carry both things (row *both* of ``selves``) do not count.
-    """
-    L = LANES
-    links, selves, poses, speed = lanes.links, lanes.selves, space.lanes.poses, space.speed
-    x, y, z = ball[CENTRE], ball[CENTRE + 1], ball[CENTRE + 2]
-    along, wx, wy, wz = 0.0, 0.0, 0.0, 0.0
-    j = carrier
-    while j >= 0:
-        if both < 0 or selves[both, 2 + j] == 0:
-            v = speed[j]
-            ax, ay, az = poses[j, 2 * L + lane], poses[j, 5 * L + lane], poses[j, 8 * L + lane]
-            if links[j, 1] == 0:
-                px, py, pz = x - poses[j, 9 * L + lane], y - poses[j, 10 * L + lane], z - poses[j, 11 * L + lane]
-                along += v * (nx * (ay * pz - az * py) + ny * (az * px - ax * pz) + nz * (ax * py - ay * px))
-                wx += v * ax
-                wy += v * ay
-                wz += v * az
-            else:
-                along += v * (nx * ax + ny * ay + nz * az)
-        j = links[j, 0]
-    cx, cy, cz = ny * wz - nz * wy, nz * wx - nx * wz, nx * wy - ny * wx
-    return along, r * math.sqrt(cx * cx + cy * cy + cz * cz)
-
-
-@kernel
-def still_apart(model, lanes, space, a, b, both, lane, g, h, margin, rate):
-    """For how much of the motion shapes *g* and *h* stay farther apart than *margin*, by the plane found last.
-
-    The gap along its normal n is a lower bound of the distance. It shrinks by no more than V t + A t² / 2: V is the
-    speed along n in this lane, and A = 2 S R bounds accelerations, S what all joints turn, R the bound *rate* on speeds.
-    """
-    ints, floats, points, graph = model.shapes.ints, model.shapes.floats, model.shapes.points, model.shapes.graph
-    if ints[g, 0] >= HALF_SPACE or ints[h, 0] >= HALF_SPACE:
-        return 0.0
-    shapes, ws = space.exact.shapes, space.exact.ws
-    vx, vy, vz = ws[AXIS, 0], ws[AXIS, 1], ws[AXIS, 2]
-    norm = math.sqrt(vx * vx + vy * vy + vz * vz)
-    if norm < 1e-12:
-        return 0.0
-    vx, vy, vz = vx / norm, vy / norm, vz / norm
-    difference(ints, floats, points, graph, g, h, -vx, -vy, -vz, ws, ws[0])
-    gap = vx * ws[0, 0] + vy * ws[0, 1] + vz * ws[0, 2] - floats[g, 3] - floats[h, 3] - margin
-    if gap <= 0.0:
-        return 0.0
-    T = shapes[g]
-    nx = T[0] * vx + T[1] * vy + T[2] * vz
-    ny = T[3] * vx + T[4] * vy + T[5] * vz
-    nz = T[6] * vx + T[7] * vy + T[8] * vz
-    speed, turning = drift(lanes, space, lanes.parts[a, 0], both, lane, T, floats[g, 7], nx, ny, nz)
-    if b >= 0:
-        other, more = drift(lanes, space, lanes.parts[b, 0], both, lane, shapes[h], floats[h, 7], nx, ny, nz)
-        speed -= other
-        turning += more
-    V = abs(speed) + turning
-    return 2.0 * gap / (V + math.sqrt(V * V + 4.0 * space.turning[0] * rate * gap) + 1e-300)
-
-
-@kernel
-def middle_marked(marks):
-    """The marked lane nearest to the middle of the marked range, or −1."""
-    first, last = -1, -1
-    for lane in range(LANES):
-        if marks[lane] > 0.0:
-            first = lane if first < 0 else first
-            last = lane
-    best = first
-    for lane in range(max(first, 0), last + 1):
-        if marks[lane] > 0.0 and abs(2 * lane - first - last) < abs(2 * best - first - last):
-            best = lane
-    return best
-
-
-@kernel
-def settle(model, lanes, space, a, b, both, first, stride, count, margin, rate, resolution, stop):
-    """Ask the exact shapes of nodes *a* and *b* (−1: fixed) in the lanes that are marked; whether any of them touch.
-
-    *count* pairs of shapes from *first* on, each *stride* after the last. What is known in one lane speaks for as much
-    of the motion around it as the shapes need to meet. What stays open is noted in ``state``.
-    """
-    L = LANES
-    pairs, arrays, poses, shapes = model.pairs, model.shapes, space.exact.poses, space.exact.shapes
-    memory, ws, big, stack = space.exact.memory, space.exact.ws, space.exact.big, space.exact.stack
-    flags, middle, state = space.lanes.flags, space.middle, space.state
-    marks, half = flags[L : 2 * L], flags[2 * L : 3 * L]
-    touched = False
-    while True:
-        lane = middle_marked(marks)
-        if lane < 0:
-            return touched
-        marks[lane] = 0.0
-        put_shapes(model, lanes, space, a, lane)
-        if b >= 0:
-            put_shapes(model, lanes, space, b, lane)
-        need = margin + (rate * half[lane] if rate * half[lane] > resolution else 0.0)
-        still = 1e300
-        for i in range(count):
-            p = first + i * stride
-            g, h = pairs[p, 0], pairs[p, 1]
-            lower, upper = pair_gap(arrays, g, h, poses, shapes, memory[p], ws, big, stack, need, margin, 0.05)
-            if lower <= margin and upper <= margin:
-                if stop:
-                    return True
-                touched = True
-                state[lane] = 2.0
-                still = -1.0
-                break
-            if rate > 0.0:
-                t = (lower - margin) / rate
-                if lower <= need and t < still:
-                    t = max(t, still_apart(model, lanes, space, a, b, both, lane, g, h, margin, rate))
-                still = min(still, t)
-        if still < 0.0:
-            continue
-        if still < half[lane] and rate * half[lane] > resolution:
-            state[lane] = max(state[lane], 1.0)
-        for i in range(L):
-            if abs(middle[i] - middle[lane]) + half[i] <= still:
-                marks[i] = 0.0
-
-
-@kernel
 def clear_marks(flags):
     """No lane is marked."""
     for lane in range(2 * LANES):
@@ -255,7 +95,7 @@ def marked_fixed(lanes, space, k, o, rate, margin, resolution):
     """Mark the lanes in which spheres of node *k* may meet fixed shape *o*; whether there are any."""
     parts, spheres, nodes, fixed, own = lanes.parts, lanes.spheres, lanes.nodes, lanes.fixed, space.lanes
     flags, balls, centres = own.flags, own.balls, own.centres
-    grid = fixed[o, 16] >= NO_BOX
+    grid = fixed[o, 16] >= HALF_SPACE
     radius = nodes[k, 3] + margin
     if grid:
         near = near_grid(lanes, o, balls, k, radius, rate, resolution, flags, False)
@@ -306,8 +146,8 @@ def note(state, flags):
 
 
 @kernel
-def block_hit(model, lanes, space, margin, resolution, stop):
-    """Whether any lane hits something; fills ``state``. With *stop* at the first hit: the state is incomplete then."""
+def block_hit(model, lanes, space, margin, resolution):
+    """Whether any lane hits something; if not, ``state`` says which pieces are open."""
     parts, nodes, owns, own = lanes.parts, lanes.nodes, lanes.owns, space.lanes
     meets, selves, exactly, fixed = lanes.meets, lanes.selves, lanes.exactly, lanes.fixed
     flags, state, order, bounds, rates = own.flags, space.state, space.order, space.bounds, space.rates
@@ -321,12 +161,11 @@ def block_hit(model, lanes, space, margin, resolution, stop):
         own.ready[k] = 0
         carry_point(own.poses, parts[k, 0], nodes[k, 0], nodes[k, 1], nodes[k, 2], own.balls, k)
         bound(own.balls, k, nodes[k, 3] + margin, bounds)
-    found = False
     for i in range(meets.shape[0]):
         c = order[i]
         k, o = meets[c, 0], meets[c, 1]
         rate = rates[B + k]
-        if fixed[o, 16] < NO_BOX and not may_meet(bounds, k, fixed, o, rate * widest):
+        if fixed[o, 16] < HALF_SPACE and not may_meet(bounds, k, fixed, o, rate * widest):
             continue
         if not marked_fixed(lanes, space, k, o, rate, margin, resolution):
             continue
@@ -335,13 +174,11 @@ def block_hit(model, lanes, space, margin, resolution, stop):
         else:
             count = owns[k, 1] - owns[k, 0]
             first, stride = meets[c, 2], meets[c, 3]
-            touch = settle(model, lanes, space, k, -1, -1, first, stride, count, margin, rate, resolution, stop)
+            touch = settle(model, lanes, space, k, -1, -1, first, stride, count, margin, rate, resolution)
         if touch:
-            found = True
             if i > 0:
                 order[i], order[i - 1] = order[i - 1], c
-            if stop:
-                return True
+            return True
     for p in range(B):
         a, b = selves[p, 0], selves[p, 1]
         rate = rates[p]
@@ -353,12 +190,10 @@ def block_hit(model, lanes, space, margin, resolution, stop):
             touch = note(state, flags)
         else:
             first, count = lanes.ranges[p, 0], lanes.ranges[p, 1] - lanes.ranges[p, 0]
-            touch = settle(model, lanes, space, a, b, p, first, 1, count, margin, rate, resolution, stop)
+            touch = settle(model, lanes, space, a, b, p, first, 1, count, margin, rate, resolution)
         if touch:
-            found = True
-            if stop:
-                return True
-    return found
+            return True
+    return False
 
 
 @kernel
@@ -392,6 +227,8 @@ def edge_blocked(exact, lanes, qa, qb, margin, resolution, space):
     """
     motion_rates(lanes, qa, qb, space.rates, space.speed, space.turning)
     queue, q, middle, half = space.queue, space.lanes.q, space.middle, space.lanes.flags[2 * LANES : 3 * LANES]
+    decides = lanes.decides[0] == 1
+    state = space.lanes.flags[LANES : 2 * LANES] if decides else space.state
     queue[0, 0], queue[0, 1] = 0.0, 1.0
     head, count = 0, 1
     while count > 0:
@@ -401,10 +238,14 @@ def edge_blocked(exact, lanes, qa, qb, margin, resolution, space):
             t = at(j, 1)
             for lane in range(LANES):
                 q[t + lane] = a + middle[lane] * d
-        if block_hit(exact, lanes, space, margin, resolution, True):
+        if decides:
+            hit_lanes(lanes, space.lanes, space.rates, margin, resolution, 1)
+            if count_flags(space.lanes.flags, 0) > 0:
+                return True
+        elif block_hit(exact, lanes, space, margin, resolution):
             return True
         for lane in range(used):
-            if space.state[lane] > 0.0:
+            if state[lane] > 0.0:
                 slot = (head + count) % QUEUE
                 queue[slot, 0], queue[slot, 1] = middle[lane] - half[lane], middle[lane]
                 slot = (head + count + 1) % QUEUE

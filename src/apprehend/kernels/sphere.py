@@ -160,8 +160,12 @@ def count_flags(flags, row):
 
 
 @kernel
-def hit_lanes(model, space, margin, enough):
-    """Hits of the sixteen configurations in ``space.q``: row 0 of ``flags``; stops once *enough* lanes are hit."""
+def hit_lanes(model, space, rates, margin, resolution, enough):
+    """Hits of the sixteen configurations in ``space.q``: rows 0 (hard) and 1 (soft) of ``flags``.
+
+    Soft hits are those of spheres grown by what *rates* move in half a piece (row 2 of ``flags``), unless that is less
+    than *resolution*. Stops once *enough* lanes are hit hard.
+    """
     parts, spheres, nodes = model.parts, model.spheres, model.nodes
     fixed, meets, selves = model.fixed, model.meets, model.selves
     poses, balls, centres, ready = space.poses, space.balls, space.centres, space.ready
@@ -175,30 +179,32 @@ def hit_lanes(model, space, margin, enough):
         flags[lane] = 0.0
     for c in range(meets.shape[0]):
         k, o = meets[c, 0], meets[c, 1]
+        rate = rates[B + k]
         if fixed[o, 16] >= HALF_SPACE:
-            if near_grid(model, o, balls, k, nodes[k, 3] + margin, 0.0, 0.0, flags, False):
+            if near_grid(model, o, balls, k, nodes[k, 3] + margin, rate, resolution, flags, False):
                 ready_node(parts, spheres, poses, centres, ready, k)
                 for s in range(parts[k, 1], parts[k, 2]):
-                    near_grid(model, o, centres, s, spheres[s, 3] + margin, 0.0, 0.0, flags, True)
+                    near_grid(model, o, centres, s, spheres[s, 3] + margin, rate, resolution, flags, True)
                 if count_flags(flags, 0) >= enough:
                     return
-        elif near_fixed(fixed, o, balls, k, nodes[k, 3] + margin, 0.0, 0.0, flags, False):
+        elif near_fixed(fixed, o, balls, k, nodes[k, 3] + margin, rate, resolution, flags, False):
             ready_node(parts, spheres, poses, centres, ready, k)
             for s in range(parts[k, 1], parts[k, 2]):
-                near_fixed(fixed, o, centres, s, spheres[s, 3] + margin, 0.0, 0.0, flags, True)
+                near_fixed(fixed, o, centres, s, spheres[s, 3] + margin, rate, resolution, flags, True)
             if count_flags(flags, 0) >= enough:
                 return
     for p in range(B):
         a, b = selves[p, 0], selves[p, 1]
-        if near_sphere(balls, a, balls, b, nodes[a, 3] + nodes[b, 3] + margin, 0.0, 0.0, flags, False):
+        rate = rates[p]
+        if near_sphere(balls, a, balls, b, nodes[a, 3] + nodes[b, 3] + margin, rate, resolution, flags, False):
             ready_node(parts, spheres, poses, centres, ready, a)
             ready_node(parts, spheres, poses, centres, ready, b)
             for i in range(parts[a, 1], parts[a, 2]):
                 reach = spheres[i, 3] + nodes[b, 3] + margin
-                if near_sphere(centres, i, balls, b, reach, 0.0, 0.0, flags, False):
+                if near_sphere(centres, i, balls, b, reach, rate, resolution, flags, False):
                     for j in range(parts[b, 1], parts[b, 2]):
                         radius = spheres[i, 3] + spheres[j, 3] + margin
-                        near_sphere(centres, i, centres, j, radius, 0.0, 0.0, flags, True)
+                        near_sphere(centres, i, centres, j, radius, rate, resolution, flags, True)
             if count_flags(flags, 0) >= enough:
                 return
 
@@ -208,12 +214,12 @@ def check_lanes(model, q, margin, start, stop, out):
     """``out[i]``: 1 where some spheres of ``q[i]`` meet, else 0."""
     n = q.shape[1]
     space = sphere_space(model, n)
-    flags, lanes = space.flags, space.q
+    flags, lanes, still = space.flags, space.q, np.zeros(model.selves.shape[0] + model.parts.shape[0])
     for first in range(start, stop, LANES):
         for lane in range(LANES):
             row = min(first + lane, stop - 1)
             for j in range(n):
                 lanes[j * LANES + lane] = q[row, j]
-        hit_lanes(model, space, margin, LANES)
+        hit_lanes(model, space, still, margin, 0.0, LANES)
         for lane in range(min(LANES, stop - first)):
             out[first + lane] = int(flags[lane])
