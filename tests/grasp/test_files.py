@@ -148,3 +148,24 @@ def test_commands_on_a_simulated_model(tmp_path, apprehend):
     code, _, error = apprehend("grasp", "check", written(tmp_path, PAIR), "--body", "thing")
     assert code == 2
     assert "is no .xml" in error
+
+
+@pytest.mark.parametrize("hand", ["panda_hand", "allegro_right"])
+def test_planning_on_the_command_line(tmp_path, apprehend, hand):
+    code, out, error = apprehend("grasp", "plan", hand, "can", "--n", "2", "--json")
+    assert code == 0, error
+    answer = json.loads(out)
+    assert 1 <= len(answer["grasps"]) <= 2
+    first = answer["grasps"][0]
+    assert ("q" in first) == (hand == "allegro_right")
+    again = read_grasp(written(tmp_path, {"contacts": first["contacts"]}, "one.json"))
+    assert again.force_closure().success
+    code, out, _ = apprehend("grasp", "plan", hand, "can", "--n", "1")
+    assert code == 0
+    assert "1 grasps" in out
+
+
+def test_no_grasp_on_the_command_line(apprehend):
+    code, out, _ = apprehend("grasp", "plan", "panda_hand", "can", "--friction", "0.001")
+    assert code == 1
+    assert "'panda_hand' on 'can'" in out

@@ -11,7 +11,7 @@ from .console import console, print_json
 
 if TYPE_CHECKING:
     from ..arrays import Array
-    from ..grasp import Grasp
+    from ..grasp import Candidate, Grasp
 
 File = Annotated[
     Path, typer.Argument(help="contacts: .json or .csv (see apprehend.grasp.read_grasp), or an MJCF model .xml")
@@ -27,12 +27,12 @@ Torsion = Annotated[float, typer.Option(help="γ in m of soft fingers without th
 Picture = Annotated[Path | None, typer.Option(help="write a picture (.png, .svg, .pdf)")]
 Json = Annotated[bool, typer.Option("--json", help="print JSON")]
 
-app = typer.Typer(no_args_is_help=True, help="Judge grasps given as contacts.")
+app = typer.Typer(no_args_is_help=True, help="Judge grasps given as contacts, or plan them.")
 
 
 @app.callback()
 def root() -> None:
-    """Judge grasps given as contacts."""
+    """Judge grasps given as contacts, or plan them."""
 
 
 def _read(
@@ -129,6 +129,66 @@ def _print_check(title: str, grasp: Grasp, force: Any, form: Any, qualities: dic
         certified = "exact" if q.lower == q.upper else f"between {q.lower:.6g} and {q.upper:.6g}"
         table.add_row(name, f"{q.value:.6g}", certified if q.upper < float("inf") else "at least")
     console.print(table)
+
+
+@app.command("plan")
+def plan(
+    hand: Annotated[str, typer.Argument(help="a hand of the catalogue, or a file")],
+    body: Annotated[str, typer.Argument(help="a mesh, or a household body")],
+    n: Annotated[int, typer.Option(help="how many grasps")] = 10,
+    method: Annotated[str, typer.Option(help="of hands with several fingers: both, inverse or closing")] = "both",
+    friction: Annotated[float | None, typer.Option(help="µ (default: the body's)")] = None,
+    mass: Annotated[float | None, typer.Option(help="of a mesh, in kg")] = None,
+    seed: Annotated[int, typer.Option(help="of the random numbers")] = 0,
+    view: View = False,
+    port: Port = 8080,
+    as_json: Json = False,
+) -> int:
+    """Plan grasps of a body by a hand, best first. Exit code 0: found; 1: none, and why; 2: wrong input."""
+    import numpy as np
+
+    from .. import grasp
+    from ..bodies import HOUSEHOLD, Body
+    from ..kinematics import Hand
+
+    thing = Body.household(body) if body in HOUSEHOLD and mass is None else Body.load(body, mass=mass)
+    gripper = Hand.load(hand)
+    found = grasp.plan(gripper, thing, n=n, rng=np.random.default_rng(seed), friction=friction, method=method)
+    if as_json:
+        print_json({"why": found.explain(), "rejected": dict(found.rejected), "grasps": [_as_data(c) for c in found]})
+    else:
+        console.print(found.explain())
+        if found.success:
+            table = _table(f"{gripper.name} on {thing.name}", "rank", "quality", "contacts", "force", "how")
+            for i, c in enumerate(found):
+                how = c.method if isinstance(c, grasp.HandCandidate) else f"{1e3 * c.width:.1f} mm wide"
+                links = ", ".join(c.links) if isinstance(c, grasp.HandCandidate) else "both pads"
+                table.add_row(str(i), f"{c.quality:.3f}", links, f"{c.required_force:.1f} N", how)
+            console.print(table)
+    if view and found.success:
+        from .. import viewer
+
+        viewer.show_grasp(thing, found.candidates, gripper, port=port, announce=console.print)
+    return 0 if found.success else 1
+
+
+def _as_data(candidate: Candidate) -> dict[str, Any]:
+    """A grasp as JSON: poses in the frame of the body, and its contacts as `read_grasp` reads them."""
+    from ..grasp import HandCandidate
+
+    data: dict[str, Any] = {
+        "quality": candidate.quality, "T_body_hand": candidate.pose.tolist(), "T_body_tcp": candidate.tcp.tolist(),
+        "required_force": float(candidate.required_force),
+        "margins": {name: float(value) for name, value in candidate.margins.items()},
+        "contacts": [{"position": c.position.tolist(), "normal": c.normal.tolist(), "model": c.model.value,
+                      "friction": c.friction, "torsion": c.torsion} for c in candidate.contacts],
+    }  # fmt: skip
+    if isinstance(candidate, HandCandidate):
+        data |= {"q": candidate.q.tolist(), "pregrasp": candidate.pregrasp.tolist(), "links": list(candidate.links),
+                 "method": candidate.method}  # fmt: skip
+    else:
+        data |= {"width": candidate.width, "opening": candidate.opening}
+    return data
 
 
 def _show(grasp: Grasp, forces: Array | None, view: bool, port: int) -> None:

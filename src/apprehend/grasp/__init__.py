@@ -9,10 +9,10 @@ from .forces import ContactForces, ForceBatch, ForceStatus
 from .grasp import Grasp
 from .hand_grasp import HandGrasp, hand_jacobian
 from .immobility import Immobility, ImmobilityStatus
-from .jaw_plan import plan
 from .limits import Limits
 from .patch import Patch
 from .picture import save_picture
+from .plans import plan
 from .push import Push
 from .quality import Quality
 from .surface import Surface

@@ -28,7 +28,7 @@ def plan(
     clearance: float = 0.005,
     table_clearance: float = 0.003,
     standoff: float = 0.1,
-    samples: int = 2000,
+    samples: int | None = None,
     angles: int = 24,
     cone_margin: float = np.radians(3.0),
     compliance: float = 1e-3,
@@ -48,15 +48,15 @@ def plan(
     force that proves force closure; ``quality`` is the certified lower bound of ε (L1, exact cones, torques over the
     body's radius), and ``margins`` hold it with ``closure``, ``contacts``, ``position`` (m that every contact may be
     off), ``force`` (N), ``com_distance``, ``distance`` (of the nearest link, in m). The contact forces must hold weight
-    and acceleration within the efforts of the joints where they are known. *samples* are tries per way; *approach*,
-    *table*, *friction*, *max_force*, *safety*, *acceleration* and *apart* mean the same for all hands, the other
-    options concern jaws.
+    and acceleration within the efforts of the joints where they are known. *samples* are tries per way (480 if None);
+    *approach*, *table*, *friction*, *max_force*, *safety*, *acceleration* and *apart* mean the same for all hands, the
+    other options concern jaws.
 
-    **Parallel jaws**: antipodal pairs of surface points are found by ray casting on the mesh; each closing line is
-    tried at *angles* approach directions around it and at several depths. A pose counts if the open hand (convex
-    pieces of all links, at least *clearance* wider than the body on each side) meets neither the body nor the table,
-    also while it comes from *standoff* back along the approach; if the pads, resting on what stands out most
-    (*compliance* deep), touch two patches whose normals lie within the friction cones of their connecting line by
+    **Parallel jaws**: antipodal pairs of surface points (*samples*, 2000 if None) are found by ray casting on the mesh;
+    each closing line is tried at *angles* approach directions around it and at several depths. A pose counts if the
+    open hand (convex pieces of all links, at least *clearance* wider than the body on each side) meets neither the body
+    nor the table, also while it comes from *standoff* back along the approach; if the pads, resting on what stands out
+    most (*compliance* deep), touch two patches whose normals lie within the friction cones of their connecting line by
     *cone_margin*; if the closed hand has room; and if the hand can hold the weight and accelerations of *acceleration*
     m/s² in every direction with *safety*, pressing with at most *max_force* (default: what the hand can).
 
@@ -81,8 +81,9 @@ def plan(
     if not hand.is_jaw:
         given = HandSettings(
             body.friction if friction is None else float(friction),
-            ("inverse", "closing") if method == "both" else (method,), samples, half_spaces(table), acceleration,
-            safety, apart, np.inf if max_force is None else float(max_force), directions(approach), approach_tolerance,
+            ("inverse", "closing") if method == "both" else (method,), 480 if samples is None else samples,
+            half_spaces(table), acceleration, safety, apart, np.inf if max_force is None else float(max_force),
+            directions(approach), approach_tolerance,
         )  # fmt: skip
         from .hand_plan import HandSearch
 
@@ -91,9 +92,9 @@ def plan(
     mu = body.friction if friction is None else float(friction)
     settings = checked(
         Settings(
-            mu, jaw.max_force if max_force is None else float(max_force), clearance, standoff, samples, angles,
-            cone_margin, compliance, safety, acceleration, table_clearance, directions(approach),
-            approach_tolerance, half_spaces(table), apart,
+            mu, jaw.max_force if max_force is None else float(max_force), clearance, standoff,
+            2000 if samples is None else samples, angles, cone_margin, compliance, safety, acceleration,
+            table_clearance, directions(approach), approach_tolerance, half_spaces(table), apart,
         ),
         n,
     )  # fmt: skip
