@@ -29,6 +29,19 @@ class Field(NamedTuple):
 
 
 @kernel
+def _cell(field, x, y, z):
+    """Cell (i, j, k) of the nearest point of the grid's box, its place in the cell (0 … 1), and the way to it in m."""
+    shape, inverse = field.values.shape, 1.0 / field.spacing
+    u0, u1, u2 = (x - field.origin[0]) * inverse, (y - field.origin[1]) * inverse, (z - field.origin[2]) * inverse
+    c0 = min(max(u0, 0.0), shape[0] - 1.0)
+    c1 = min(max(u1, 0.0), shape[1] - 1.0)
+    c2 = min(max(u2, 0.0), shape[2] - 1.0)
+    i, j, k = min(int(c0), shape[0] - 2), min(int(c1), shape[1] - 2), min(int(c2), shape[2] - 2)
+    d0, d1, d2 = (u0 - c0) * field.spacing, (u1 - c1) * field.spacing, (u2 - c2) * field.spacing
+    return i, j, k, c0 - i, c1 - j, c2 - k, d0, d1, d2
+
+
+@kernel
 def sample(field, x, y, z):
     """The signed distance at a point of the field's frame; device function, never NaN for finite points.
 
@@ -36,17 +49,7 @@ def sample(field, x, y, z):
     the body lies within the box, so this is never more than the distance, and short of it by less than d(q).
     """
     v = field.values
-    inverse = 1.0 / field.spacing
-    u0 = (x - field.origin[0]) * inverse
-    u1 = (y - field.origin[1]) * inverse
-    u2 = (z - field.origin[2]) * inverse
-    c0 = min(max(u0, 0.0), v.shape[0] - 1.0)
-    c1 = min(max(u1, 0.0), v.shape[1] - 1.0)
-    c2 = min(max(u2, 0.0), v.shape[2] - 1.0)
-    i = min(int(c0), v.shape[0] - 2)
-    j = min(int(c1), v.shape[1] - 2)
-    k = min(int(c2), v.shape[2] - 2)
-    a, b, c = c0 - i, c1 - j, c2 - k
+    i, j, k, a, b, c, d0, d1, d2 = _cell(field, x, y, z)
     p00 = v[i, j, k] + c * (v[i, j, k + 1] - v[i, j, k])
     p01 = v[i, j + 1, k] + c * (v[i, j + 1, k + 1] - v[i, j + 1, k])
     p10 = v[i + 1, j, k] + c * (v[i + 1, j, k + 1] - v[i + 1, j, k])
@@ -54,9 +57,9 @@ def sample(field, x, y, z):
     p0 = p00 + b * (p01 - p00)
     p1 = p10 + b * (p11 - p10)
     value = p0 + a * (p1 - p0)
-    out = (u0 - c0) ** 2 + (u1 - c1) ** 2 + (u2 - c2) ** 2
+    out = d0 * d0 + d1 * d1 + d2 * d2
     if out > 0.0:
-        return math.sqrt(out * field.spacing * field.spacing + value * value)
+        return math.sqrt(out + value * value)
     return value
 
 
@@ -64,17 +67,7 @@ def sample(field, x, y, z):
 def sample_gradient(field, x, y, z):
     """`sample` and its gradient ``(d, gx, gy, gz)``; within a cell the derivative of the trilinear interpolant."""
     v = field.values
-    inverse = 1.0 / field.spacing
-    u0 = (x - field.origin[0]) * inverse
-    u1 = (y - field.origin[1]) * inverse
-    u2 = (z - field.origin[2]) * inverse
-    c0 = min(max(u0, 0.0), v.shape[0] - 1.0)
-    c1 = min(max(u1, 0.0), v.shape[1] - 1.0)
-    c2 = min(max(u2, 0.0), v.shape[2] - 1.0)
-    i = min(int(c0), v.shape[0] - 2)
-    j = min(int(c1), v.shape[1] - 2)
-    k = min(int(c2), v.shape[2] - 2)
-    a, b, c = c0 - i, c1 - j, c2 - k
+    i, j, k, a, b, c, d0, d1, d2 = _cell(field, x, y, z)
     s00 = float(v[i, j, k + 1]) - float(v[i, j, k])
     s01 = float(v[i, j + 1, k + 1]) - float(v[i, j + 1, k])
     s10 = float(v[i + 1, j, k + 1]) - float(v[i + 1, j, k])
@@ -83,11 +76,11 @@ def sample_gradient(field, x, y, z):
     p10, p11 = v[i + 1, j, k] + c * s10, v[i + 1, j + 1, k] + c * s11
     p0, p1 = p00 + b * (p01 - p00), p10 + b * (p11 - p10)
     value = p0 + a * (p1 - p0)
+    inverse = 1.0 / field.spacing
     gx = (p1 - p0) * inverse
     gy = ((p01 - p00) + a * ((p11 - p10) - (p01 - p00))) * inverse
     s0, s1 = s00 + b * (s01 - s00), s10 + b * (s11 - s10)
     gz = (s0 + a * (s1 - s0)) * inverse
-    d0, d1, d2 = (u0 - c0) * field.spacing, (u1 - c1) * field.spacing, (u2 - c2) * field.spacing
     if d0 != 0.0 or d1 != 0.0 or d2 != 0.0:  # on the box the point q does not move along the clamped axes
         far = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2 + value * value)
         gx = (d0 if d0 != 0.0 else value * gx) / far
