@@ -6,10 +6,13 @@ of the minimum (a test compares with an exhaustive search).
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import apprehend as ap
 from apprehend import trajectory as tj
+from apprehend.spatial import so3
 
 from ._harness import interleave, seconds
 
@@ -48,23 +51,43 @@ def halving(answer: tj.LineResult, deviation: float) -> int:
     return points(0.0, answer.points[0], 1.0, answer.points[-1]) + 1
 
 
+def turned(x: float, y: float, z: float, turn: tuple[float, float, float]) -> np.ndarray:
+    """The tool turned away from pointing down."""
+    T = down(x, y, z)
+    T[:3, :3] = so3.exp(turn) @ T[:3, :3]
+    return T
+
+
 def main() -> None:
-    """A 0.6 m line on two arms, at three deviations."""
+    """A 0.6 m line on two arms, at three deviations; a screw and an arc."""
     T0, T1 = down(0.4, -0.3, 0.3), down(0.4, 0.3, 0.3)
     for name in ("panda", "ur5"):
         robot = ap.Robot.load(name)
         start = tj.straight_line(robot, T0, T1).require_success().points[0]
         for deviation in (1e-2, 1e-3, 1e-4):
 
-            def run(robot: ap.Robot = robot, q0: np.ndarray = start, deviation: float = deviation) -> tj.LineResult:
-                return tj.straight_line(robot, T0, T1, q0=q0, deviation=deviation)
+            def run(robot: ap.Robot = robot, deviation: float = deviation, **options: Any) -> tj.LineResult:
+                return tj.straight_line(robot, T0, T1, deviation=deviation, **options)
 
-            timing = interleave({"line": (run, 1)}, 21)["line"]
-            answer = run()
+            timing = interleave({"given": (lambda q0=start, run=run: run(q0=q0), 1), "found": (run, 1)}, 31)
+            answer = run(q0=start)
             print(
                 f"{name:6} 0.6 m, {1e3 * deviation:5.1f} mm: {answer.points.shape[0]:3} points (halving "
                 f"{halving(answer, deviation):3}), proven {1e3 * answer.deviation:.5f} mm, measured at 10,000 samples "
-                f"{1e3 * measured(answer):.5f} mm; {seconds(timing.median)} (fastest {seconds(timing.fastest)})"
+                f"{1e3 * measured(answer):.5f} mm; {seconds(timing['given'].median)} (fastest "
+                f"{seconds(timing['given'].fastest)}), with the inverse kinematics of its start "
+                f"{seconds(timing['found'].median)}"
+            )
+        ends = down(0.4, -0.2, 0.3), turned(0.5, 0.2, 0.4, (0.3, 0.2, 0.9))
+        for kind, call in {
+            "screw": lambda robot=robot, ends=ends: tj.screw_line(robot, *ends),
+            "arc": lambda robot=robot, ends=ends: tj.arc(robot, ends[0], [0.5, 0.0, 0.35], down(0.4, 0.2, 0.3)),
+        }.items():
+            timing = interleave({kind: (call, 1)}, 31)
+            answer = call().require_success()
+            print(
+                f"{name:6} {kind:6} 1.0 mm: {answer.points.shape[0]:3} points, proven {1e3 * answer.deviation:.5f} mm "
+                f"and {1e3 * answer.rotation:.3f} mrad; {seconds(timing[kind].median)} with its inverse kinematics"
             )
 
 

@@ -85,22 +85,24 @@ def test_the_proven_violation_is_zero_and_true(robot: ap.Robot, kind: str, grid:
         assert used.max() > 0.9 or (np.abs(v) / robot.limits.velocity).max() > 0.99
 
 
-def test_torques_recomputed_by_pinocchio() -> None:
+def test_torques_recomputed_by_pinocchio(robot: ap.Robot) -> None:
     pin = pytest.importorskip("pinocchio")
-    robot = ap.Robot.load("ur5")
     model = pin.buildModelFromUrdf(str(robot.description.source))
     data = model.createData()
-    assert model.nq == robot.n
+    mimics = {j.name: j.mimic.joint for j in robot.description.joints if j.mimic}  # the fingers: multiplier 1
+    column = [robot.index(mimics.get(name, name)) for name in list(model.names)[1:]]
+    assert [model.joints[k + 1].idx_q for k in range(len(column))] == list(range(model.nq))
     path = spline(robot, 5)
-    effort = np.array([60.0, 120.0, 60.0, 12.0, 12.0, 12.0])
-    timing = tj.time_optimal(path, limits(robot), constraints=[tj.TorqueLimits(robot, effort)], grid=150)
+    still = np.abs(robot.gravity(path(np.linspace(0.0, 1.0, 300)))).max(axis=0)
+    effort = np.maximum(0.35 * robot.limits.effort, 1.3 * still)
+    timing = tj.time_optimal(path, limits(robot), constraints=[tj.TorqueLimits(robot, effort)], grid=100)
     motion = timing.require_success().motion
-    order = [model.joints[model.getJointId(name)].idx_q for name in robot.joint_names]
-    for t in np.linspace(0.0, motion.duration, 500):
-        q, v, a = (np.empty(robot.n) for _ in range(3))
-        q[order], v[order], a[order] = motion(t), motion(t, 1), motion(t, 2)
-        torque = pin.rnea(model, data, q, v, a)[order]
-        assert (np.abs(torque) <= effort * (1 + 1e-6)).all()
+    used = 0.0
+    for t in np.linspace(0.0, motion.duration, 1500):
+        torque = np.zeros(robot.n)
+        np.add.at(torque, column, pin.rnea(model, data, motion(t)[column], motion(t, 1)[column], motion(t, 2)[column]))
+        used = max(used, float((np.abs(torque) / effort).max()))
+    assert 0.9 < used <= 1.0 + 1e-9
 
 
 def test_cartesian_speed(robot: ap.Robot) -> None:
