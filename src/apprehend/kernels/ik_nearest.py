@@ -110,7 +110,7 @@ def nearest_poses(chain, targets, first, last, guesses, table, order, seed, star
             age[l] += 1.0
             gain = lowest[l] - cost[l]
             if gain >= 0.0:
-                idle[l] = idle[l] + 1.0 if gain < REST * (1.0 + cost[l]) else 0.0
+                idle[l] = idle[l] + 1.0 if gain < REST * (0.01 + cost[l]) else 0.0
                 lowest[l] = cost[l]
                 damping[l] = max(damping[l] * 0.25, 1e-9)
                 for c in range(k):
