@@ -117,79 +117,78 @@ def within_sincos(q, model):
 
 
 @kernel(inline=True)
+def numbers(place, i):
+    """The twelve numbers of ``place[i]``."""
+    return (
+        place[i, 0], place[i, 1], place[i, 2], place[i, 3], place[i, 4], place[i, 5],
+        place[i, 6], place[i, 7], place[i, 8], place[i, 9], place[i, 10], place[i, 11],
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def row_through(pose, start, k, lane, e):
+    """Row k of the product of the pose that begins at *start* of ``pose`` and the transform *e* of twelve numbers."""
+    a0 = pose[start + 3 * k * LANES + lane]
+    a1 = pose[start + (3 * k + 1) * LANES + lane]
+    a2 = pose[start + (3 * k + 2) * LANES + lane]
+    return (
+        a0 * e[0] + a1 * e[3] + a2 * e[6],
+        a0 * e[1] + a1 * e[4] + a2 * e[7],
+        a0 * e[2] + a1 * e[5] + a2 * e[8],
+        pose[start + (9 + k) * LANES + lane] + a0 * e[9] + a1 * e[10] + a2 * e[11],
+    )
+
+
+@kernel(inline=True)
+def put_row(pose, start, k, lane, b0, b1, b2, p):
+    """Row k of the pose that begins at *start* of ``pose``."""
+    pose[start + 3 * k * LANES + lane] = b0
+    pose[start + (3 * k + 1) * LANES + lane] = b1
+    pose[start + (3 * k + 2) * LANES + lane] = b2
+    pose[start + (9 + k) * LANES + lane] = p
+
+
+@kernel(inline=True)
 def revolve_block(place, i, q, coordinate, multiplier, offset, pose, axes):
     """Move ``pose (12 * LANES)`` through ``place[i]`` and a rotation about z; joint i's axis goes into *axes*.
 
     The angle is ``multiplier * q[coordinate] + offset``.
     """
-    L = LANES
-    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
-    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
-    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
-    x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    e = numbers(place, i)
     d = at(coordinate, 1)
     a = at(i, 6)
-    for lane in range(L):
+    for lane in range(LANES):
         s, c = sincos(multiplier * q[d + lane] + offset)
         for k in range(3):
-            a0 = pose[3 * k * L + lane]
-            a1 = pose[(3 * k + 1) * L + lane]
-            a2 = pose[(3 * k + 2) * L + lane]
-            b0 = a0 * r00 + a1 * r10 + a2 * r20
-            b1 = a0 * r01 + a1 * r11 + a2 * r21
-            b2 = a0 * r02 + a1 * r12 + a2 * r22
-            p = pose[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
-            pose[3 * k * L + lane] = b0 * c + b1 * s
-            pose[(3 * k + 1) * L + lane] = b1 * c - b0 * s
-            pose[(3 * k + 2) * L + lane] = b2
-            pose[(9 + k) * L + lane] = p
-            axes[a + k * L + lane] = p
-            axes[a + (3 + k) * L + lane] = b2
+            b0, b1, b2, p = row_through(pose, 0, k, lane, e)
+            put_row(pose, 0, k, lane, b0 * c + b1 * s, b1 * c - b0 * s, b2, p)
+            axes[a + k * LANES + lane] = p
+            axes[a + (3 + k) * LANES + lane] = b2
 
 
 @kernel(inline=True)
 def slide_block(place, i, q, coordinate, multiplier, offset, pose, axes):
     """As `revolve_block`, for a translation along z."""
-    L = LANES
-    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
-    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
-    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
-    x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    e = numbers(place, i)
     d = at(coordinate, 1)
     a = at(i, 6)
-    for lane in range(L):
+    for lane in range(LANES):
         h = multiplier * q[d + lane] + offset
         for k in range(3):
-            a0 = pose[3 * k * L + lane]
-            a1 = pose[(3 * k + 1) * L + lane]
-            a2 = pose[(3 * k + 2) * L + lane]
-            b2 = a0 * r02 + a1 * r12 + a2 * r22
-            p = pose[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z + b2 * h
-            pose[3 * k * L + lane] = a0 * r00 + a1 * r10 + a2 * r20
-            pose[(3 * k + 1) * L + lane] = a0 * r01 + a1 * r11 + a2 * r21
-            pose[(3 * k + 2) * L + lane] = b2
-            pose[(9 + k) * L + lane] = p
-            axes[a + k * L + lane] = p
-            axes[a + (3 + k) * L + lane] = b2
+            b0, b1, b2, p = row_through(pose, 0, k, lane, e)
+            put_row(pose, 0, k, lane, b0, b1, b2, p + b2 * h)
+            axes[a + k * LANES + lane] = p + b2 * h
+            axes[a + (3 + k) * LANES + lane] = b2
 
 
 @kernel(borrow=True)
 def place_block(place, i, pose):
     """Multiply ``pose (12 * LANES)`` by the constant transform ``place[i]`` from the right."""
-    L = LANES
-    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
-    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
-    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
-    x, y, z = place[i, 9], place[i, 10], place[i, 11]
-    for lane in range(L):
+    e = numbers(place, i)
+    for lane in range(LANES):
         for k in range(3):
-            a0 = pose[3 * k * L + lane]
-            a1 = pose[(3 * k + 1) * L + lane]
-            a2 = pose[(3 * k + 2) * L + lane]
-            pose[3 * k * L + lane] = a0 * r00 + a1 * r10 + a2 * r20
-            pose[(3 * k + 1) * L + lane] = a0 * r01 + a1 * r11 + a2 * r21
-            pose[(3 * k + 2) * L + lane] = a0 * r02 + a1 * r12 + a2 * r22
-            pose[(9 + k) * L + lane] += a0 * x + a1 * y + a2 * z
+            b0, b1, b2, p = row_through(pose, 0, k, lane, e)
+            put_row(pose, 0, k, lane, b0, b1, b2, p)
 
 
 @kernel(borrow=True)

@@ -38,8 +38,11 @@ from .chain import (
     at,
     lane_buffer,
     load_block,
+    numbers,
     pose_buffer,
     pose_places,
+    put_row,
+    row_through,
     store_block,
     within_sincos,
     wrap_angles,
@@ -64,27 +67,18 @@ class TreeModel(NamedTuple):
 @kernel(borrow=True)
 def place_of(place, i, poses, parent, pose):
     """``pose = poses[parent] · place[i]`` on lanes, 12 components each; parent −1 is the world."""
-    L = LANES
-    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
-    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
-    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
-    x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    e = numbers(place, i)
     if parent < 0:
         for k in range(12):
             value = place[i, k]
-            for lane in range(L):
-                pose[k * L + lane] = value
+            for lane in range(LANES):
+                pose[k * LANES + lane] = value
         return
-    s = at(parent, 12)
-    for lane in range(L):
+    start = at(parent, 12)
+    for lane in range(LANES):
         for k in range(3):
-            a0 = poses[s + 3 * k * L + lane]
-            a1 = poses[s + (3 * k + 1) * L + lane]
-            a2 = poses[s + (3 * k + 2) * L + lane]
-            pose[3 * k * L + lane] = a0 * r00 + a1 * r10 + a2 * r20
-            pose[(3 * k + 1) * L + lane] = a0 * r01 + a1 * r11 + a2 * r21
-            pose[(3 * k + 2) * L + lane] = a0 * r02 + a1 * r12 + a2 * r22
-            pose[(9 + k) * L + lane] = poses[s + (9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
+            b0, b1, b2, p = row_through(poses, start, k, lane, e)
+            put_row(pose, 0, k, lane, b0, b1, b2, p)
 
 
 @kernel(inline=True)
@@ -93,63 +87,31 @@ def revolve_through(place, i, q, coordinate, multiplier, offset, pose, poses):
 
     The result is also ``poses[i]``.
     """
-    L = LANES
-    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
-    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
-    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
-    x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    e = numbers(place, i)
     t = at(i, 12)
     d = at(coordinate, 1)
-    for lane in range(L):
+    for lane in range(LANES):
         s, c = sincos(multiplier * q[d + lane] + offset)
         for k in range(3):
-            a0 = pose[3 * k * L + lane]
-            a1 = pose[(3 * k + 1) * L + lane]
-            a2 = pose[(3 * k + 2) * L + lane]
-            b0 = a0 * r00 + a1 * r10 + a2 * r20
-            b1 = a0 * r01 + a1 * r11 + a2 * r21
-            b2 = a0 * r02 + a1 * r12 + a2 * r22
-            p = pose[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z
+            b0, b1, b2, p = row_through(pose, 0, k, lane, e)
             a0 = b0 * c + b1 * s
             a1 = b1 * c - b0 * s
-            pose[3 * k * L + lane] = a0
-            pose[(3 * k + 1) * L + lane] = a1
-            pose[(3 * k + 2) * L + lane] = b2
-            pose[(9 + k) * L + lane] = p
-            poses[t + 3 * k * L + lane] = a0
-            poses[t + (3 * k + 1) * L + lane] = a1
-            poses[t + (3 * k + 2) * L + lane] = b2
-            poses[t + (9 + k) * L + lane] = p
+            put_row(pose, 0, k, lane, a0, a1, b2, p)
+            put_row(poses, t, k, lane, a0, a1, b2, p)
 
 
 @kernel(inline=True)
 def slide_through(place, i, q, coordinate, multiplier, offset, pose, poses):
     """As `revolve_through`, for a translation along z."""
-    L = LANES
-    r00, r01, r02 = place[i, 0], place[i, 1], place[i, 2]
-    r10, r11, r12 = place[i, 3], place[i, 4], place[i, 5]
-    r20, r21, r22 = place[i, 6], place[i, 7], place[i, 8]
-    x, y, z = place[i, 9], place[i, 10], place[i, 11]
+    e = numbers(place, i)
     t = at(i, 12)
     d = at(coordinate, 1)
-    for lane in range(L):
+    for lane in range(LANES):
         h = multiplier * q[d + lane] + offset
         for k in range(3):
-            a0 = pose[3 * k * L + lane]
-            a1 = pose[(3 * k + 1) * L + lane]
-            a2 = pose[(3 * k + 2) * L + lane]
-            b0 = a0 * r00 + a1 * r10 + a2 * r20
-            b1 = a0 * r01 + a1 * r11 + a2 * r21
-            b2 = a0 * r02 + a1 * r12 + a2 * r22
-            p = pose[(9 + k) * L + lane] + a0 * x + a1 * y + a2 * z + b2 * h
-            pose[3 * k * L + lane] = b0
-            pose[(3 * k + 1) * L + lane] = b1
-            pose[(3 * k + 2) * L + lane] = b2
-            pose[(9 + k) * L + lane] = p
-            poses[t + 3 * k * L + lane] = b0
-            poses[t + (3 * k + 1) * L + lane] = b1
-            poses[t + (3 * k + 2) * L + lane] = b2
-            poses[t + (9 + k) * L + lane] = p
+            b0, b1, b2, p = row_through(pose, 0, k, lane, e)
+            put_row(pose, 0, k, lane, b0, b1, b2, p + b2 * h)
+            put_row(poses, t, k, lane, b0, b1, b2, p + b2 * h)
 
 
 @kernel(borrow=True)
