@@ -1,7 +1,22 @@
-"""Paths that are free of collision, and straight lines of a tool."""
+"""Paths that are free of collision, with constraints where wanted, and straight lines of a tool."""
 
-from .plan import plan, shortcut
+from .constraints import Constraints, Inside, PathConstraint, Turned, Upright
+from .plan import plan
 from .result import PlanResult, PlanStatus
+from .search import shortcut
+from .smoothing import smooth
 from .straight import straight
 
-__all__ = ["PlanResult", "PlanStatus", "plan", "shortcut", "straight"]
+__all__ = [
+    "Constraints",
+    "Inside",
+    "PathConstraint",
+    "PlanResult",
+    "PlanStatus",
+    "Turned",
+    "Upright",
+    "plan",
+    "shortcut",
+    "smooth",
+    "straight",
+]

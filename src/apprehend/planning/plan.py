@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,24 +13,16 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, BoolArray, IntArray, as_shaped
 from ..collision import CollisionModel, Touch
 from ..errors import InputError
-from ..kernels import collide_edges, collide_plan
+from ..kernels import collide_plan
 from ..kinematics import Robot
+from .constrained import LEAD, ConstrainedSearch
+from .constraints import Constraints, PathConstraint
 from .result import PlanResult, PlanStatus
-
-STRIDE = 0.8
-"""Largest step of a tree in joint space, in rad (and m)."""
-
-WIDEST, LEAST = 0.45, 0.2
-"""Bounds of a node's domain (see `kernels.collide_plan.grow`) relative to the diagonal of the joint space."""
+from .search import SHORTCUTS, Search, first_direct, shortcut
+from .smoothing import smooth as smoothed
 
 MAX_NODES = 20_000
 """Largest number of nodes of one tree."""
-
-FIRST_ROOM = 512
-"""Nodes that a tree has room for at first."""
-
-SHORTCUTS = 100
-"""Random shortcuts that are tried on a path."""
 
 LIMIT_SLACK = 1e-6
 """How far a given configuration may lie beyond a joint limit, in rad or m; it is moved onto the limit."""
@@ -44,14 +37,20 @@ def plan(
     time_limit: float = 2.0,
     joints: Iterable[int] | None = None,
     simplify: bool = True,
+    smooth: bool = False,
     max_nodes: int = MAX_NODES,
+    constraints: Sequence[PathConstraint] = (),
 ) -> PlanResult:
     """A path from *start* ``(n,)`` to the nearest reachable of *goals* ``(n,)`` or ``(k, n)``.
 
     First a straight motion to each goal, the nearest first; then RRT-Connect from the start and all free goals at
-    once, until a path is found or *time_limit* (s) is spent; then shortcuts. *joints* are the indices of the
-    coordinates that may move; the others stay as in the start, whatever the goals say. Angles of joints without
-    limits are taken modulo a turn. Every motion of the path was checked as `CollisionModel.edges_free` does.
+    once, until a path is found or *time_limit* (s) is spent; then shortcuts (*simplify*) and rounded corners
+    (*smooth*). *joints* are the indices of the coordinates that may move; the others stay as in the start, whatever
+    the goals say. Angles of joints without limits are taken modulo a turn. Every motion of the path was checked as
+    `CollisionModel.edges_free` does.
+
+    *constraints* (`Upright`, `Inside`, `Turned`) hold all along the path; they are kept by moving every new
+    configuration onto them. Start and goals must keep them themselves.
 
     The same *rng* state gives the same path, unless the time runs out. Raises `InputError` for arrays of the wrong
     shape; whatever the numbers lead to is in the answer's status.
@@ -68,15 +67,46 @@ def plan(
         raise InputError(f"time_limit is {time_limit}; expected a positive number of seconds")
     moving = moving_joints(robot, joints)
     targets[:, ~moving] = q0[~moving]
+    keep = Constraints(robot, constraints, moving) if constraints else None
 
-    def answer(status: PlanStatus, **facts: object) -> PlanResult:
-        return PlanResult(status, seconds=time.perf_counter() - began, **facts)  # type: ignore[arg-type]
+    task = _task(model, q0, targets, moving, keep)
+    if isinstance(task, PlanResult):
+        return task.timed(time.perf_counter() - began)
+    direct = _direct(model, task, keep)
+    if direct >= 0:
+        ends = np.stack([task.start, task.goals[direct]])
+        path = ends if (ends[0] != ends[1]).any() else ends[:1]
+        return PlanResult(PlanStatus.SUCCESS, path, direct, seconds=time.perf_counter() - began)
+    until = began + time_limit
+    if keep is None:
+        result = _free(model, task, rng, until, began, max_nodes, simplify)
+    else:
+        result = _on_constraints(model, task, keep, rng, until, began, max_nodes, simplify)
+    if smooth and result.success:
+        result = result.along(smoothed(model, result.path, constraints=constraints))
+    return result.timed(time.perf_counter() - began)
 
-    limits = robot.limits
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """A start, goals of which those numbered *usable* are free, and where to draw samples."""
+
+    start: Array
+    goals: Array
+    usable: IntArray
+    low: Array
+    high: Array
+
+
+def _task(
+    model: CollisionModel, q0: Array, targets: Array, moving: BoolArray, keep: Constraints | None
+) -> _Task | PlanResult:
+    """What is to be planned, or the reason why there is nothing to plan."""
+    robot, limits = model.robot, model.robot.limits
     lower = np.where(moving, limits.lower, q0)
     upper = np.where(moving, limits.upper, q0)
     if not len(targets):
-        return answer(PlanStatus.NO_GOAL)
+        return PlanResult(PlanStatus.NO_GOAL)
     turning = np.flatnonzero(moving & (limits.lower == -np.inf) & (limits.upper == np.inf))
     if len(turning):
         way = targets[:, turning] - q0[turning]
@@ -85,127 +115,85 @@ def plan(
     inside = np.clip(both, lower, upper)
     within = np.abs(both - inside).max(axis=1) <= LIMIT_SLACK
     if not within[0]:
-        return answer(PlanStatus.START_OUT_OF_LIMITS, detail=f"{violated(robot, q0, lower, upper)}.")
+        return PlanResult(PlanStatus.START_OUT_OF_LIMITS, detail=f"{violated(robot, q0, lower, upper)}.")
     if not within[1:].any():
         worst = violated(robot, targets[0], lower, upper)
-        return answer(PlanStatus.GOALS_OUT_OF_LIMITS, detail=f"Goal 0: {worst}.")
+        return PlanResult(PlanStatus.GOALS_OUT_OF_LIMITS, detail=f"Goal 0: {worst}.")
     free = within & model.free(inside)
     q0, targets = inside[0].copy(), inside[1:].copy()
     if not free[0]:
         touches = model.why(q0)
-        return answer(PlanStatus.START_IN_COLLISION, detail=f"{'; '.join(map(str, touches[:3]))}.", touches=touches)
+        detail = f"{'; '.join(map(str, touches[:3]))}."
+        return PlanResult(PlanStatus.START_IN_COLLISION, detail=detail, touches=touches)
     usable = np.flatnonzero(free[1:])
     if not len(usable):
-        return answer(PlanStatus.GOALS_IN_COLLISION, **_why_goals(model, targets, within[1:]))
-
-    near = np.argsort(((targets[usable] - q0) ** 2).sum(axis=1), kind="stable")
-    direct = first_direct(model, q0, targets, usable[near])
-    if direct >= 0:
-        path = np.stack([q0, targets[direct]]) if (targets[direct] != q0).any() else q0[None].copy()
-        return answer(PlanStatus.SUCCESS, path=path, goal=direct)
-
+        return _why_goals(model, targets, within[1:])
+    if keep is not None:
+        if why := keep.why(q0):
+            return PlanResult(PlanStatus.START_OFF_CONSTRAINT, detail=f"{why}.")
+        kept = keep.violation(targets[usable]) <= 0.0
+        if not kept.any():
+            first = int(usable[0])
+            return PlanResult(PlanStatus.GOALS_OFF_CONSTRAINT, detail=f"Goal {first}: {keep.why(targets[first])}.")
+        usable = usable[kept]
     # joints without limits: half a turn around the start and the goals
     span = np.concatenate([q0[None], targets[usable]])
     low = np.where(np.isfinite(lower), lower, span.min(axis=0) - np.pi)
     high = np.where(np.isfinite(upper), upper, span.max(axis=0) + np.pi)
-    search = Search(model, q0, targets[usable], max_nodes)
+    return _Task(q0, targets, usable, low, high)
+
+
+def _direct(model: CollisionModel, task: _Task, keep: Constraints | None) -> int:
+    """The nearest goal that a straight motion reaches, or −1."""
+    near = np.argsort(((task.goals[task.usable] - task.start) ** 2).sum(axis=1), kind="stable")
+    order = task.usable[near]
+    if keep is not None:
+        order = order[keep.hold(np.repeat(task.start[None], len(order), axis=0), task.goals[order], LEAD)]
+    return first_direct(model, task.start, task.goals, order)
+
+
+def _free(
+    model: CollisionModel, task: _Task, rng: np.random.Generator, until: float, began: float, max_nodes: int,
+    simplify: bool,
+) -> PlanResult:  # fmt: skip
+    """RRT-Connect, and shortcuts."""
+    search = Search(model, task.start, task.goals[task.usable], max_nodes)
     while True:
-        status = search.grow(rng, low, high)
-        if status != collide_plan.MORE or time.perf_counter() - began > time_limit:
+        status = search.grow(rng, task.low, task.high)
+        if status != collide_plan.MORE or time.perf_counter() > until:
             break
-    spent = {"nodes": int(search.count.sum()), "samples": search.samples}
+    a, b = (int(count) for count in search.count)
     if status != collide_plan.CONNECTED:
-        out_of = PlanStatus.NODES_SPENT if status == collide_plan.FULL else PlanStatus.TIME_SPENT
-        a, b = search.count
-        detail = (
-            f"{time.perf_counter() - began:.2f} s and {search.samples} samples; the tree from the start has {a} nodes, "
-            f"that from {len(usable)} free of {len(targets)} goals {b}."
-        )
-        return answer(out_of, detail=detail, **spent)
+        return _spent(status == collide_plan.FULL, began, search.samples, (a, b), task)
     path, root = search.path()
     if simplify:
         path = shortcut(model, path, rng=rng)
-    return answer(PlanStatus.SUCCESS, path=path, goal=int(usable[root]), **spent)
+    return PlanResult(PlanStatus.SUCCESS, path, int(task.usable[root]), nodes=a + b, samples=search.samples)
 
 
-def first_direct(model: CollisionModel, start: Array, goals: Array, order: IntArray) -> int:
-    """The first of *goals* in *order* that a straight motion reaches, or −1."""
-    starts = np.repeat(start[None], len(goals), axis=0)
-    blocked = np.ones(len(goals), np.int64)
-    limits = model.clearance, model.resolution
-    collide_edges.edges(model.compiled, model.lanes, starts, goals, order, *limits, 0, len(order), blocked)
-    free = order[blocked[order] == 0]
-    return int(free[0]) if len(free) else -1
+def _on_constraints(
+    model: CollisionModel, task: _Task, keep: Constraints, rng: np.random.Generator, until: float, began: float,
+    max_nodes: int, simplify: bool,
+) -> PlanResult:  # fmt: skip
+    """The same on constraints."""
+    search = ConstrainedSearch(model, keep, task.start, task.goals[task.usable], task.low, task.high)
+    found = search.solve(rng, until, max_nodes)
+    nodes, samples = search.nodes, search.samples
+    if found is None:
+        return _spent(max(nodes) >= max_nodes, began, samples, nodes, task)
+    path, root = found
+    if simplify:
+        path = search.shorten(path, rng, SHORTCUTS, until)
+    return PlanResult(PlanStatus.SUCCESS, path, int(task.usable[root]), nodes=sum(nodes), samples=samples)
 
 
-class Search:
-    """Two growing trees."""
-
-    def __init__(self, model: CollisionModel, start: Array, goals: Array, max_nodes: int):
-        self.model = model
-        self.most = max(max_nodes, len(goals) + 1)
-        room = min(self.most, max(FIRST_ROOM, 2 * len(goals)))
-        self.nodes = np.empty((2, room, len(start)))
-        self.parent = np.full((2, room), -1, np.int64)
-        self.domain = np.full((2, room), np.inf)
-        self.count = np.array([1, len(goals)], np.int64)
-        self.nodes[0, 0] = start
-        self.nodes[1, : len(goals)] = goals
-        self.samples = 0
-        self.chunk = 64
-
-    def grow(self, rng: np.random.Generator, lower: Array, upper: Array) -> int:
-        """Try one more portion of random configurations."""
-        samples = rng.uniform(lower, upper, (self.chunk, len(lower)))
-        across = float(np.linalg.norm(upper - lower))
-        status, used = collide_plan.grow(
-            self.model.compiled, self.model.lanes,
-            self.nodes, self.parent, self.domain, self.count,
-            samples, STRIDE, WIDEST * across, LEAST * across, self.model.clearance, self.model.resolution,
-        )  # fmt: skip
-        self.samples += int(used)
-        self.chunk = min(2 * self.chunk, 512)
-        if status == collide_plan.FULL and self.nodes.shape[1] < self.most:
-            self._make_room()
-            return int(collide_plan.MORE)
-        return int(status)
-
-    def _make_room(self) -> None:
-        old = self.nodes.shape[1]
-        room = min(4 * old, self.most)
-        nodes, parent = np.empty((2, room, self.nodes.shape[2])), np.full((2, room), -1, np.int64)
-        domain = np.full((2, room), np.inf)
-        nodes[:, :old], parent[:, :old], domain[:, :old] = self.nodes, self.parent, self.domain
-        self.nodes, self.parent, self.domain = nodes, parent, domain
-
-    def path(self) -> tuple[Array, int]:
-        """The path through both trees once they meet, and the number of the goal that it reaches."""
-        halves = []
-        root = 0
-        for k in (0, 1):
-            row, rows = int(self.count[k]) - 1, []
-            while row >= 0:
-                rows.append(row)
-                root = row
-                row = int(self.parent[k, row])
-            halves.append(self.nodes[k, rows])
-        return np.concatenate([halves[0][::-1], halves[1][1:]]), root
-
-
-def shortcut(model: CollisionModel, path: ArrayLike, *, rng: np.random.Generator, tries: int = SHORTCUTS) -> Array:
-    """A shorter path ``(M', n)`` with the same ends: vertices are passed by and random shortcuts taken where free."""
-    points = as_shaped(path, "path", model.robot.n)
-    if points.ndim != 2 or not len(points):
-        raise InputError(f"path has shape {points.shape}; expected (M, {model.robot.n})")
-    if len(points) < 3:
-        return points.copy()
-    room = np.zeros((len(points) + 2 * tries + 2, model.robot.n))
-    room[: len(points)] = points
-    pairs = rng.uniform(size=(tries, 2))
-    count = collide_plan.shortcut(
-        model.compiled, model.lanes, room, len(points), pairs, model.clearance, model.resolution
+def _spent(full: bool, began: float, samples: int, nodes: tuple[int, int], task: _Task) -> PlanResult:
+    detail = (
+        f"{time.perf_counter() - began:.2f} s and {samples} samples; the tree from the start has {nodes[0]} nodes, "
+        f"that from {len(task.usable)} free of {len(task.goals)} goals {nodes[1]}."
     )
-    return room[:count].copy()
+    status = PlanStatus.NODES_SPENT if full else PlanStatus.TIME_SPENT
+    return PlanResult(status, detail=detail, nodes=sum(nodes), samples=samples)
 
 
 def moving_joints(robot: Robot, joints: Iterable[int] | None) -> BoolArray:
@@ -229,7 +217,7 @@ def violated(robot: Robot, q: Array, lower: Array, upper: Array) -> str:
     return f"{robot.joint_names[j]} is {q[j]:.4g}, limits {lower[j]:.4g} to {upper[j]:.4g}"
 
 
-def _why_goals(model: CollisionModel, targets: Array, within: BoolArray) -> dict[str, object]:
+def _why_goals(model: CollisionModel, targets: Array, within: BoolArray) -> PlanResult:
     words: list[str] = []
     first: tuple[Touch, ...] = ()
     for k, target in enumerate(targets[:20]):
@@ -240,4 +228,4 @@ def _why_goals(model: CollisionModel, targets: Array, within: BoolArray) -> dict
         else:
             words.append(f"goal {k}: joint limits")
     more = f"; and {len(words) - 4} more" if len(words) > 4 else ""
-    return {"detail": f"{'; '.join(words[:4])}{more}.", "touches": first}
+    return PlanResult(PlanStatus.GOALS_IN_COLLISION, detail=f"{'; '.join(words[:4])}{more}.", touches=first)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,7 +25,8 @@ class PlanStatus(Status):
     UNREACHABLE = "The straight line leaves what the arm can reach within its joint limits."
     BRANCH_CHANGE = "The straight line needs a jump of the joints: it passes a singularity or changes the branch."
     COLLISION = "The straight line collides."
-    TILTED = "A start or goal violates the constraint on the path."
+    START_OFF_CONSTRAINT = "The start violates a constraint on the path."
+    GOALS_OFF_CONSTRAINT = "Every goal violates a constraint on the path, or is in collision, or beyond joint limits."
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,14 @@ class PlanResult(Result):
     def length(self) -> float:
         """Length of the path in joint space, in rad and m."""
         return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum()) if len(self.path) > 1 else 0.0
+
+    def timed(self, seconds: float) -> PlanResult:
+        """The answer with the time that it took."""
+        return replace(self, seconds=seconds)
+
+    def along(self, path: Array) -> PlanResult:
+        """The answer with another path."""
+        return replace(self, path=path)
 
     def explain(self) -> str:
         """The status, and the facts behind it."""
