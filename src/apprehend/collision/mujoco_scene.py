@@ -35,19 +35,24 @@ def from_mujoco(source: object, *, robot: str | None = None) -> Scene:
     world = read_world(source, robot)
     made = Robot(world.description)
     names = {*made.frame_names}
+    things = {name: [name] for name in made.frame_names if name != world.description.root}  # of the model's bodies
     bodies: dict[str, Placed] = {}
     for body in world.bodies:
         if body.shapes:
             name = _unused(body.name, names)
             bodies[name] = Placed(_body(body, name, str(source)), body.pose)
+            things[body.name] = [name]
     boxes: list[Box] = []
     obstacles: dict[str, Obstacle] = {}
     for thing in world.fixed:
         name = _unused(thing.name, names)
+        things.setdefault(thing.body, []).append(name)
         if thing.shape is not None and thing.shape.kind is ShapeKind.BOX:
             boxes.append(Box(name, np.array(thing.shape.size), thing.shape.pose, thing.rgba, thing.friction))
         else:
             obstacles[name] = _obstacle(thing, name)
+    pairs = sorted(sorted(p) for p in world.excluded if len(p) == 2)
+    allowed = [(one, other) for a, b in pairs for one in things.get(a, ()) for other in things.get(b, ())]
     arm = str(Path(str(source)).resolve()) if world.source is not None else "a model in memory"
     return Scene(
         robot=made,
@@ -56,6 +61,7 @@ def from_mujoco(source: object, *, robot: str | None = None) -> Scene:
         boxes=tuple(boxes),
         obstacles=obstacles,
         gravity=world.gravity,
+        allowed=tuple(allowed),
         source=world.source,
     )
 

@@ -5,8 +5,9 @@ constant), then the values, the last axis fastest. Its frame lies in the middle 
 interpolated trilinearly. Beyond the grid, with p the nearest point of the grid, it is √(|x − p|² + d(p)²), which is
 never more than the distance to a solid within the grid.
 
-Boxes are bounded from below by the Lipschitz constant and, where they are small, by a plane under the nodes' values,
-whose least value on the shape is one support point: so a flat shape on a flat field is settled at once.
+Boxes are bounded from below by the Lipschitz constant and, where they are small, by a plane under the nodes' values:
+its least value on the box, on the shape (one support point), and where the box meets a half-space that holds the shape.
+So a flat shape on a flat field is settled at once, and one on a round field soon.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from ._jit import kernel
 from .gjk import AXIS, BEST, KEEP, NEAR, REL, SPARE, gjk, support, witnesses
 
 HEADER = 8
-BLOCK = 2.0
+BLOCK = 4.0
 """Half side, in cells, from which on boxes are bounded by planes."""
 
 STACK = 400  # rows of the stack of boxes
@@ -166,6 +167,40 @@ def in_grid(grids, start, x, y, z, half):
 
 
 @kernel(fast=False)
+def plane_bound(ints, floats, points, graph, a, h, half, lower, upper, ws):
+    """The least value on a box and the core of *a* of the plane under the field in that box.
+
+    The middle of the box is ``ws[SPARE + 3, 0:3]``, at a distance between *lower* and *upper* along ``ws[AXIS]``; the
+    point of the core that is lowest on the plane goes into ``ws[SPARE + 3, 3:6]``.
+    """
+    keep, plane, at, point = ws[KEEP], ws[SPARE + 1], ws[SPARE + 3], ints.shape[0] - 1
+    gx = (keep[0] * plane[0] + keep[1] * plane[1] + keep[2] * plane[2]) / h
+    gy = (keep[3] * plane[0] + keep[4] * plane[1] + keep[5] * plane[2]) / h
+    gz = (keep[6] * plane[0] + keep[7] * plane[1] + keep[8] * plane[2]) / h
+    px, py, pz, _ = support(ints, floats, points, graph, a, -gx, -gy, -gz, 0.0)
+    at[3], at[4], at[5] = px, py, pz
+    on_shape = gx * (px - at[0]) + gy * (py - at[1]) + gz * (pz - at[2])
+    in_box = -(abs(plane[0]) + abs(plane[1]) + abs(plane[2])) * half
+    bound = max(plane[4], plane[3] + max(on_shape, in_box))
+    steepest = math.sqrt(gx * gx + gy * gy + gz * gz)
+    shift = 0.0
+    if upper == 0.0 and steepest > 0.0:  # the middle is inside: look for a half-space from below the box
+        shift = 2.0 * ROOT3 * half * h / steepest
+        ws[REL, 9], ws[REL, 10], ws[REL, 11] = at[0] - shift * gx, at[1] - shift * gy, at[2] - shift * gz
+        _, lower, upper = gjk(ints, floats, points, graph, a, point, ws, 1e300, 0.0, 1e-6)
+    if upper > 0.0:
+        vx, vy, vz = ws[AXIS, 0] / upper, ws[AXIS, 1] / upper, ws[AXIS, 2] / upper
+        along = gx * vx + gy * vy + gz * vz
+        if along > 0.0:
+            rest = 0.0
+            for c in range(3):
+                e = keep[c] * (gx - along * vx) + keep[3 + c] * (gy - along * vy)
+                rest += abs(e + keep[6 + c] * (gz - along * vz))
+            bound = max(bound, plane[3] + along * (lower - shift * along) - rest * half * h)
+    return bound
+
+
+@kernel(fast=False)
 def field_gap(ints, floats, points, graph, grids, a, b, ws, above, below, tolerance, stack):
     """Bounds on the least value of field *b* on shape *a*; ``ws[REL]`` holds the pose of b in a.
 
@@ -218,14 +253,9 @@ def field_gap(ints, floats, points, graph, grids, a, b, ws, above, below, tolera
             best = try_point(grids, start, ws, at[0], at[1], at[2], best, scratch)
         if whole and half <= BLOCK:
             plane_under(grids, start, x, y, z, half, plane, scratch)
-            gx = (keep[0] * plane[0] + keep[1] * plane[1] + keep[2] * plane[2]) / h
-            gy = (keep[3] * plane[0] + keep[4] * plane[1] + keep[5] * plane[2]) / h
-            gz = (keep[6] * plane[0] + keep[7] * plane[1] + keep[8] * plane[2]) / h
-            px, py, pz, _ = support(ints, floats, points, graph, a, -gx, -gy, -gz, 0.0)
-            on_shape = gx * (px - at[0]) + gy * (py - at[1]) + gz * (pz - at[2])
-            in_box = -(abs(plane[0]) + abs(plane[1]) + abs(plane[2])) * half
-            bound = max(bound, max(plane[4], plane[3] + max(on_shape, in_box)))
-            best = try_point(grids, start, ws, px, py, pz, best, scratch)
+            under = plane_bound(ints, floats, points, graph, a, h, half, lower, upper, ws)
+            bound = max(bound, under)
+            best = try_point(grids, start, ws, at[3], at[4], at[5], best, scratch)
         if best <= below:
             low = min(low, best)
             break

@@ -35,6 +35,7 @@ class FixedThing:
     """One geom that stands still: a shape, a plane (whose normal is z of its pose), or a surface of triangles."""
 
     name: str
+    body: str  # that it belongs to
     pose: Array  # (4, 4) in the world
     shape: Shape | None  # at its pose in the world; None: a plane, or *surface*
     surface: tuple[Array, IntArray] | None
@@ -50,6 +51,7 @@ class World:
     bodies: tuple[FreeBody, ...]
     fixed: tuple[FixedThing, ...]
     gravity: float  # m/s², along −z
+    excluded: frozenset[frozenset[str]]  # pairs of the model's bodies that never touch
     source: Path | None
 
 
@@ -124,8 +126,13 @@ class _World:
             tuple(self._free(b) for b in sorted(free)),
             tuple(thing for b in standing for thing in self._fixed(b)),
             -float(m.opt.gravity[2]),
+            self._excluded(),
             None if self.bare else self.path,
         )
+
+    def _excluded(self) -> frozenset[frozenset[str]]:
+        numbers = [(int(s) >> 16, int(s) & 0xFFFF) for s in self.m.exclude_signature]
+        return frozenset(frozenset((self.body[a], self.body[b])) for a, b in numbers)
 
     def _model_name(self) -> str:
         return self.m.names[: self.m.names.index(b"\0")].decode() or self.path.stem
@@ -191,10 +198,11 @@ class _World:
         m, kinds = self.m, self.mj.mjtGeom
         T = self._place(b)
         found = []
-        for g in range(int(m.body_geomadr[b]), int(m.body_geomadr[b] + m.body_geomnum[b])):
-            if not (m.geom_contype[g] or m.geom_conaffinity[g]):
-                continue
-            name = m.geom(g).name or f"{self.body[b]}_geom{g}"
+        geoms = range(int(m.body_geomadr[b]), int(m.body_geomadr[b] + m.body_geomnum[b]))
+        touching = [g for g in geoms if m.geom_contype[g] or m.geom_conaffinity[g]]
+        for g in touching:
+            alone = b > 0 and len(touching) == 1
+            name = m.geom(g).name or (self.body[b] if alone else f"{self.body[b]}_geom{g}")
             rgba = m.geom_rgba[g] if m.geom_matid[g] < 0 else m.mat_rgba[m.geom_matid[g]]
             colour = (float(rgba[0]), float(rgba[1]), float(rgba[2]), float(rgba[3]))
             pose = T @ from_quaternion(m.geom_pos[g], m.geom_quat[g])
@@ -205,7 +213,7 @@ class _World:
                 shape = self._shape(b, g, T)
                 if shape is None:
                     continue
-            found.append(FixedThing(name, pose, shape, surface, colour, float(m.geom_friction[g, 0])))
+            found.append(FixedThing(name, self.body[b], pose, shape, surface, colour, float(m.geom_friction[g, 0])))
         return found
 
     def _shape(self, b: int, g: int, T: Array) -> Shape | None:

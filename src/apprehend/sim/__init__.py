@@ -12,7 +12,7 @@ from .contacts import ContactTable, Touch
 from .control import JointController, Load, Saturation
 from .grasps import Held, held, held_in, simulated
 from .gripper import Gripper, GripResult, GripStatus, JawState, grip
-from .model import Plant, build
+from .model import Plant, build, specification, to_mujoco
 from .physics import Physics
 from .record import Recording
 from .world import Controller, SettleResult, SettleStatus, World
@@ -20,5 +20,5 @@ from .world import Controller, SettleResult, SettleStatus, World
 __all__ = [
     "ContactTable", "Controller", "Gripper", "GripResult", "GripStatus", "Held", "JawState", "JointController", "Load",
     "Physics", "Plant", "Recording", "Saturation", "SettleResult", "SettleStatus", "Touch", "View", "World", "build",
-    "grip", "hand_camera", "held", "held_in", "look", "simulated",
+    "grip", "hand_camera", "held", "held_in", "look", "simulated", "specification", "to_mujoco",
 ]  # fmt: skip

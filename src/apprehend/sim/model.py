@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -15,8 +16,10 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..errors import DescriptionError, InputError
+from ..files import replace_file
 from ..robots.description import Description, Joint, JointType
 from . import shapes
+from .obstacles import add_obstacle
 from .physics import Physics
 
 if TYPE_CHECKING:
@@ -64,6 +67,37 @@ def build(scene: Scene, physics: Physics | None = None) -> Plant:
     Raises `DescriptionError` where the engine refuses the robot, with its reason.
     """
     physics = physics or Physics()
+    spec, allowed, assumptions = _specified(scene, physics)
+    return _index(_compile(spec, scene.robot.name), scene, physics, allowed, tuple(assumptions))
+
+
+def specification(scene: Scene, physics: Physics | None = None) -> Any:
+    """*scene* as a ``mujoco.MjSpec``: robot, bodies with free joints, boxes, obstacles, and the keyframe ``home``.
+
+    Names carry what they are: ``link:``, ``joint:``, ``body:``, ``box:``, ``obstacle:``. `Scene.from_mujoco` is the way
+    back.
+    """
+    spec, _, _ = _specified(scene, physics or Physics())
+    model = _compile(spec, scene.robot.name)
+    data = mujoco.MjData(model)
+    expand, offset, names = _expansion(scene.robot.description, scene.robot.joint_names)
+    for name, value in zip(names, expand @ scene.robot.home + offset, strict=True):
+        data.qpos[model.joint(f"joint:{name}").qposadr[0]] = value
+    spec.add_key(name="home", qpos=data.qpos)
+    return spec
+
+
+def to_mujoco(scene: Scene, path: str | Path, physics: Physics | None = None) -> Path:
+    """Write *scene* as MJCF, meshes inside; any MuJoCo program loads it."""
+    path = Path(path)
+    spec = specification(scene, physics)
+    spec.compile()
+    with replace_file(path) as work:
+        work.write_text(spec.to_xml(), encoding="utf-8")
+    return path
+
+
+def _specified(scene: Scene, physics: Physics) -> tuple[Any, frozenset[frozenset[str]], list[str]]:
     if not any(placed.movable for placed in scene.bodies.values()) and not scene.robot.n:
         raise InputError("the scene has neither a movable joint nor a movable body: there is nothing to simulate")
     spec = _empty(scene, physics)
@@ -76,11 +110,30 @@ def build(scene: Scene, physics: Physics | None = None) -> Plant:
         shapes.add_box(spec, box, physics)
     for name, placed in scene.bodies.items():
         shapes.add_body(spec, name, placed.body, placed.pose, physics, movable=placed.movable)
-    return _index(_compile(spec, scene.robot.name), scene, physics, allowed, tuple(assumptions))
+    for obstacle in scene.obstacles.values():
+        sentence = add_obstacle(spec, obstacle, physics)
+        assumptions += [sentence] if sentence else []
+    for first, second in _excluded(scene, allowed):
+        spec.add_exclude(bodyname1=first, bodyname2=second)
+    return spec, allowed, assumptions
+
+
+def _excluded(scene: Scene, done: frozenset[frozenset[str]]) -> list[tuple[str, str]]:
+    """The scene's allowed pairs as bodies of the engine, without those of links that are *done*.
+
+    Two things that stand still never touch there anyway.
+    """
+    kinds = dict.fromkeys(scene.robot.frame_names, "link") | {box.name: "box" for box in scene.boxes}
+    kinds |= dict.fromkeys(scene.bodies, "body") | dict.fromkeys(scene.obstacles, "obstacle")
+    still = {*(box.name for box in scene.boxes), *scene.obstacles}
+    pairs = {frozenset(p) for p in scene.allowed} - done
+    named = [sorted(p) for p in pairs if len(p) == 2 and not p <= still]
+    return [(f"{kinds[a]}:{a}", f"{kinds[b]}:{b}") for a, b in sorted(named)]
 
 
 def _empty(scene: Scene, physics: Physics) -> Any:
     spec = mujoco.MjSpec()
+    spec.modelname = scene.robot.name
     spec.compiler.degree = False
     option = spec.option
     option.timestep = physics.timestep
