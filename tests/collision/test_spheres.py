@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from apprehend.bodies import Body
+from apprehend.bodies.fit import ball
 from apprehend.collision import Box, CollisionModel, Convex, RobotSource, Scene
-from apprehend.collision.spheres import cover, enclosing_ball, excess
+from apprehend.collision.spheres import cover, excess
 from apprehend.errors import UnknownNameError
 from tests.collision.makers import gantry, planar, pose, rotation
 
@@ -62,7 +63,7 @@ def test_more_spheres_stick_out_less() -> None:
 def test_enclosing_balls_enclose_and_are_nearly_the_smallest() -> None:
     rng = np.random.default_rng(2)
     points = unit(rng, 200) * 0.7 + [1.0, 2.0, 3.0]
-    centre, radius = enclosing_ball(points)
+    centre, radius = ball(points)
     assert np.linalg.norm(points - centre, axis=1).max() <= radius
     assert radius < 0.7 * 1.03
 

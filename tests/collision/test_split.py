@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from apprehend.bodies import Body
+from apprehend.bodies.parts import cut
+from apprehend.bodies.repair import union
+from apprehend.bodies.shapes import box
+from apprehend.bodies.surface import sample, unit_normals
 from apprehend.collision import Convex, signed_distance
 from apprehend.collision.shapes import mesh_hulls
-from apprehend.collision.split import cut, split, volume
+from apprehend.collision.split import split, volume
 from tests.collision.makers import pose, rotation
 
 
@@ -54,8 +59,8 @@ def test_the_hulls_hold_the_whole_mesh(name: str) -> None:
 
 
 def test_convex_meshes_stay_whole_and_flat_ones_are_no_trouble() -> None:
-    box = Body.box([0.1, 0.2, 0.3])
-    (shape,) = mesh_hulls(box.vertices, box.faces)
+    solid = Body.box([0.1, 0.2, 0.3])
+    (shape,) = mesh_hulls(solid.vertices, solid.faces)
     assert volume_of((shape,)) == pytest.approx(0.006)
     sheet = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     assert len(mesh_hulls(sheet, np.array([[0, 1, 2], [0, 2, 3]]))) == 1
@@ -74,3 +79,23 @@ def test_cuts_share_their_rim_and_are_kept(tmp_path, monkeypatch) -> None:
         np.testing.assert_array_equal(a, b)
     kept.write_bytes(b"spoiled")
     assert len(split(vertices, faces)) == len(first)
+
+
+@pytest.mark.parametrize("seed", [2, 3, 5, 7])
+def test_the_hulls_hold_the_surface_of_coarse_meshes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    blocks = []
+    for _ in range(4):
+        vertices, faces = box(rng.uniform(0.02, 0.3, 3))
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        blocks.append((vertices @ (turn * np.linalg.det(turn)).T + rng.uniform(-0.1, 0.1, 3), faces))
+    whole = union(blocks)
+    assert whole is not None
+    triangles = whole[0][whole[1]]
+    areas = 0.5 * np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+    points = sample(triangles, areas, unit_normals(triangles), 5000, rng)[0]
+    parts = split(*whole)
+    assert len(parts) > 2
+    planes = [ConvexHull(part).equations for part in parts]
+    outside = np.min([(points @ p[:, :3].T + p[:, 3]).max(axis=1) for p in planes], axis=0)
+    assert outside.max() < 1e-9

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..bodies.cache import cache_folder
+from ..bodies.fit import ball
 from ..files import replace_file
 from ..kernels.gjk import BOX, CONE, CYLINDER, HULL
 from .shapes import Convex
@@ -80,7 +81,7 @@ def _split(points: Array, edges: list[tuple[int, int]], most: int, enough: float
 
     def push(part: Array, its_edges: list[tuple[int, int]]) -> None:
         nonlocal count
-        centre, radius = enclosing_ball(part)
+        centre, radius = ball(part)
         heapq.heappush(heap, (-radius, count, centre, part, its_edges))
         count += 1
 
@@ -129,19 +130,6 @@ def _flat_corners(points: Array) -> Array:
         return np.asarray(points[ConvexHull(along[:, :2]).vertices])
     except QhullError:
         return np.asarray(points[[int(along[:, 0].argmin()), int(along[:, 0].argmax())]])
-
-
-def enclosing_ball(points: Array) -> tuple[Array, float]:
-    """Centre and radius of a nearly smallest ball that holds *points* ``(V, 3)`` (Bădoiu & Clarkson 2003)."""
-    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    best, radius = centre, np.inf
-    for i in range(1, 60):
-        squared = ((points - centre) ** 2).sum(axis=1)
-        far = int(np.argmax(squared))
-        if squared[far] < radius * radius:
-            best, radius = centre, float(np.sqrt(squared[far]))
-        centre = centre + (points[far] - centre) / (i + 1.0)
-    return best, radius * (1.0 + 1e-9) + 1e-12
 
 
 def excess(balls: Array, shapes: tuple[Convex, ...], samples: int = 400) -> float:

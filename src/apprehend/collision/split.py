@@ -1,8 +1,7 @@
 """A mesh as a few convex hulls that contain it: cut by planes where that saves the most volume.
 
 Each part of the surface goes, with the rim of the cut, into a hull of its own, so that the hulls together hold the
-whole surface, and of a closed one the solid: nothing is ever called free that touches it. (A finer decomposition, for
-contact, is that of `bodies`.)
+whole surface: nothing is ever called free that touches it. (A finer decomposition, for contact, is that of `bodies`.)
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..bodies.cache import cache_folder
+from ..bodies.parts import cut
 from ..files import replace_file
 
 PARTS = 8
@@ -28,7 +28,7 @@ PLACES = (0.2, 0.35, 0.5, 0.65, 0.8)
 
 def split(vertices: Array, faces: IntArray) -> tuple[Array, ...]:
     """Points of the hulls of the parts, ``(V, 3)`` each; from the cache where the same mesh was split before."""
-    key = hashlib.sha256(f"2:{PARTS}:{WORTH}:{PLACES}".encode())
+    key = hashlib.sha256(f"3:{PARTS}:{WORTH}:{PLACES}".encode())
     key.update(np.ascontiguousarray(vertices).tobytes())
     key.update(np.ascontiguousarray(faces).tobytes())
     kept = cache_folder("parts") / f"{key.hexdigest()[:32]}.npz"
@@ -75,26 +75,6 @@ def best_cut(triangles: Array) -> tuple[float, Array, Array]:
             if saved > best[0]:
                 best = (saved, *sides)
     return best
-
-
-def cut(triangles: Array, axis: int, place: float) -> tuple[Array, Array]:
-    """The triangles below and above a plane; those that it crosses are clipped for either side."""
-    height = triangles[:, :, axis] - place
-    below, above = (height <= 0.0).all(axis=1), (height >= 0.0).all(axis=1)
-    crossed = ~below & ~above
-    corners, h = triangles[crossed], height[crossed]
-    ends, other = np.roll(corners, -1, axis=1), np.roll(h, -1, axis=1)
-    t = np.clip(h / np.where(h == other, 1.0, h - other), 0.0, 1.0)
-    rim = corners + t[:, :, None] * (ends - corners)  # where each edge meets the plane, if it does
-    on_plane = (h * other < 0.0)[:, :, None]
-    sides = []
-    for keep, whole in ((h <= 0.0, below), (h >= 0.0, above)):
-        # only the hull of a part matters: three triples of corners and rim points stand for the clipped polygon
-        inside = corners[np.arange(len(corners)), np.argmax(keep, axis=1)][:, None]
-        own = np.where(keep[:, :, None], corners, inside)
-        cuts = np.where(on_plane, rim, inside)
-        sides.append(np.concatenate([triangles[whole], own, cuts]))
-    return sides[0], sides[1]
 
 
 def volume(triangles: Array) -> float:
