@@ -16,6 +16,9 @@ from .step import Outcome
 
 RELEASE_TIME = 1.5
 
+UPRIGHT = 0.25
+"""Largest tilt in rad of a body that must stay upright, on the planned path; rounded corners may add 0.1."""
+
 
 @dataclass(frozen=True)
 class Transport:
@@ -35,7 +38,10 @@ class Transport:
                 False, f"no posture sets the object down from {LIFT * 100:.0f} cm above its goal as it is held"
             )
         model = models.carrying(context.held)
-        result = planning.plan(model, start, down[:1], rng=context.rng, time_limit=PLANNING_TIME, joints=context.joints)
+        result = planning.plan(
+            model, start, down[:1], rng=context.rng, time_limit=PLANNING_TIME, joints=context.joints,
+            constraints=upright(context, context.held),
+        )  # fmt: skip
         if not result.success:
             return Outcome(False, result.explain())
         motion = along_path(context, result.path, model, CARRYING)
@@ -49,6 +55,14 @@ class Transport:
             {"path": result.path, "duration": motion.duration},
             {**facts(done), "slip": context.slip},
         )
+
+
+def upright(context: Context, held: Array) -> list[planning.PathConstraint]:
+    """What keeps the body on its way as it will stand at its goal, where the scene wants it upright."""
+    if not context.scene.upright:
+        return []
+    axis = held[:3, :3] @ context.goal[2, :3]  # the body's axis that points up at the goal, in the hand
+    return [planning.Upright(context.hand.root, axis, UPRIGHT)]
 
 
 @dataclass(frozen=True)
