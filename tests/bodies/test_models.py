@@ -222,6 +222,20 @@ def test_saved_models_come_back(kind: str, tmp_path: Path) -> None:
         (Spheres if kind == "boxes" else Boxes).load(tmp_path / "model.npz")
 
 
+def test_shapes_are_checked(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="got 2 centres, 1 radii; expected as many of each"):
+        Spheres(np.zeros((2, 3)), np.ones(1))
+    with pytest.raises(InputError, match="radii contains -1"):
+        Capsules(np.zeros((1, 2, 3)), np.array([-1.0]))
+    with pytest.raises(InputError, match=r"sizes has shape \(3,\)"):
+        Boxes(np.eye(4)[None], np.ones(3))
+    with pytest.raises(InputError, match="one entry per shape"):
+        Spheres(np.zeros((0, 3)), np.zeros(0))
+    np.savez(tmp_path / "half.npz", kind="spheres", centres=np.zeros((1, 3)))
+    with pytest.raises(InputError, match=r"half\.npz lacks 'radii': the file is damaged"):
+        Spheres.load(tmp_path / "half.npz")
+
+
 def test_every_model_has_a_name() -> None:
     body = Body.household("can")
     for name in MODELS:

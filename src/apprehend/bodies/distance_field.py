@@ -180,7 +180,7 @@ class DistanceField:
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """The field that `save` wrote."""
-        data = files.read(path, "distance field")
+        data = files.read(path, "distance field", "origin", "spacing", "values", "closed", "name")
         values = np.ascontiguousarray(data["values"], dtype=np.float32)
         spacing = float(data["spacing"])
         if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all() or not spacing > 0.0:

@@ -23,8 +23,8 @@ def write(path: str | Path, kind: str, **arrays: Any) -> Path:
     return target
 
 
-def read(path: str | Path, kind: str) -> dict[str, Any]:
-    """The arrays of a file that `write` wrote; it must hold a model of this *kind*."""
+def read(path: str | Path, kind: str, *names: str) -> dict[str, Any]:
+    """The arrays of a file that `write` wrote; it must hold a model of this *kind*, and arrays of these *names*."""
     target = Path(path)
     try:
         with np.load(target, allow_pickle=False) as data:
@@ -37,6 +37,9 @@ def read(path: str | Path, kind: str) -> dict[str, Any]:
         raise InputError(
             f"{target} holds {str(found['kind']) if 'kind' in found else 'no model'!r}; expected a {kind!r}"
         )
+    missing = [name for name in names if name not in found]
+    if missing:
+        raise InputError(f"{target} lacks {', '.join(map(repr, missing))}: the file is damaged")
     return {k: v[()] if v.ndim == 0 else v for k, v in found.items()}
 
 

@@ -125,7 +125,7 @@ class Outline:
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """The outline that `save` wrote as ``.npz``."""
-        data = files.read(path, "outline")
+        data = files.read(path, "outline", "pose", "counts")
         loops, lines = (int(n) for n in data["counts"])
         return cls(
             tuple(as_shaped(data[f"loop{i}"], f"loop{i}", 2) for i in range(loops)),

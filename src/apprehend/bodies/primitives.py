@@ -37,6 +37,21 @@ class Primitives(ABC):
     """A union of simple convex shapes in the frame of the body (or link)."""
 
     KIND: ClassVar[str]
+    ENCLOSES: ClassVar[bool] = True
+    TAILS: ClassVar[dict[str, tuple[int, ...]]] = {}
+    """Shape of the entries of each array: one entry per shape of the model."""
+
+    def __post_init__(self) -> None:
+        read = {name: as_shaped(getattr(self, name), name, *tail) for name, tail in self.TAILS.items()}
+        for name, tail in self.TAILS.items():
+            if read[name].ndim != 1 + len(tail) or not len(read[name]):
+                raise InputError(f"{name} has shape {read[name].shape}; expected one entry per shape: (k, …), k ≥ 1")
+            if name in ("sizes", "radii") and read[name].min() < 0.0:
+                raise InputError(f"{name} contains {read[name].min():g}; expected lengths of zero or more, in m")
+            object.__setattr__(self, name, read[name])
+        if len({len(array) for array in read.values()}) > 1:
+            counts = ", ".join(f"{len(array)} {name}" for name, array in read.items())
+            raise InputError(f"a model of {self.KIND} got {counts}; expected as many of each")
 
     @abstractmethod
     def __len__(self) -> int: ...
@@ -114,8 +129,6 @@ class Primitives(ABC):
         """How far the body may stick out."""
         return 0.0
 
-    ENCLOSES: ClassVar[bool] = True
-
     def save(self, path: str | Path) -> Path:
         """Write the shapes as ``.npz`` (`load` reads them), or their union as a mesh (``.obj``, ``.stl``, …)."""
         if Path(path).suffix.lower() in (".npz", ""):
@@ -123,9 +136,10 @@ class Primitives(ABC):
         return files.write_mesh(path, *self.union)
 
     @classmethod
-    @abstractmethod
     def load(cls, path: str | Path) -> Self:
         """The model that `save` wrote as ``.npz``."""
+        data = files.read(path, cls.KIND, *cls.TAILS)
+        return cls(**{name: data[name] for name in cls.TAILS})
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +149,7 @@ class Boxes(Primitives):
     poses: Array
     sizes: Array
     KIND: ClassVar[str] = "boxes"
+    TAILS: ClassVar[dict[str, tuple[int, ...]]] = {"poses": (4, 4), "sizes": (3,)}
 
     @staticmethod
     def around(index: MeshIndex, count: int = 1, *, oriented: bool = True) -> Boxes:
@@ -165,12 +180,6 @@ class Boxes(Primitives):
         """The same boxes moved by *pose* ``(4, 4)``."""
         return replace(self, poses=as_pose(pose, "pose") @ self.poses)
 
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """The boxes that `save` wrote."""
-        data = files.read(path, cls.KIND)
-        return cls(as_shaped(data["poses"], "poses", 4, 4), as_shaped(data["sizes"], "sizes", 3))
-
 
 @dataclass(frozen=True, eq=False)
 class Spheres(Primitives):
@@ -179,6 +188,7 @@ class Spheres(Primitives):
     centres: Array
     radii: Array
     KIND: ClassVar[str] = "spheres"
+    TAILS: ClassVar[dict[str, tuple[int, ...]]] = {"centres": (3,), "radii": ()}
 
     @staticmethod
     def around(index: MeshIndex, count: int = 24) -> Spheres:
@@ -212,12 +222,6 @@ class Spheres(Primitives):
         T = as_pose(pose, "pose")
         return replace(self, centres=self.centres @ T[:3, :3].T + T[:3, 3])
 
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """The spheres that `save` wrote."""
-        data = files.read(path, cls.KIND)
-        return cls(as_shaped(data["centres"], "centres", 3), as_shaped(data["radii"], "radii"))
-
 
 @dataclass(frozen=True, eq=False)
 class Capsules(Primitives):
@@ -226,6 +230,7 @@ class Capsules(Primitives):
     ends: Array
     radii: Array
     KIND: ClassVar[str] = "capsules"
+    TAILS: ClassVar[dict[str, tuple[int, ...]]] = {"ends": (2, 3), "radii": ()}
 
     @staticmethod
     def around(index: MeshIndex, count: int = 1) -> Capsules:
@@ -264,12 +269,6 @@ class Capsules(Primitives):
         """The same capsules moved by *pose* ``(4, 4)``."""
         T = as_pose(pose, "pose")
         return replace(self, ends=self.ends @ T[:3, :3].T + T[:3, 3])
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """The capsules that `save` wrote."""
-        data = files.read(path, cls.KIND)
-        return cls(as_shaped(data["ends"], "ends", 2, 3), as_shaped(data["radii"], "radii"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,8 +329,9 @@ class ConvexPieces(Primitives):
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """The pieces that `save` wrote."""
-        data = files.read(path, cls.KIND)
-        return cls(tuple((data[f"v{i}"], data[f"f{i}"]) for i in range(int(data["count"]))))
+        count = int(files.read(path, cls.KIND, "count")["count"])
+        data = files.read(path, cls.KIND, *(f"{letter}{i}" for i in range(count) for letter in "vf"))
+        return cls(tuple((data[f"v{i}"], data[f"f{i}"]) for i in range(count)))
 
 
 Fitted = TypeVar("Fitted", bound=Primitives)

@@ -139,7 +139,7 @@ class Voxels:
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """The voxels that `save` wrote."""
-        data = files.read(path, "voxels")
+        data = files.read(path, "voxels", "origin", "spacing", "filled", "shape", "rule")
         shape = tuple(int(n) for n in data["shape"])
         filled = np.unpackbits(data["filled"], count=int(np.prod(shape))).astype(bool).reshape(shape)
         return cls(as_shaped(data["origin"], "origin", 3), float(data["spacing"]), filled, str(data["rule"]))

@@ -137,7 +137,7 @@ class Wireframe:
         """The wireframe that `save` wrote."""
         path = Path(path)
         if path.suffix.lower() != ".obj":
-            data = files.read(path, "wireframe")
+            data = files.read(path, "wireframe", "points", "edges")
             return cls(np.asarray(data["points"], dtype=np.float64), np.asarray(data["edges"], dtype=np.int64))
         if not path.is_file():
             raise MeshError(f"{path} does not exist")
