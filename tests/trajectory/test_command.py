@@ -60,3 +60,27 @@ def test_waypoint_files(tmp_path: Path) -> None:
     motion = tj.cubic([0.0], [1.0], 1.0)
     tj.to_ros(motion, tmp_path / "m.ros.json", dt=0.25)
     assert len(json.loads((tmp_path / "m.ros.json").read_text())["points"]) == 5
+
+
+def test_limits_of_the_robot_are_kept(tmp_path: Path) -> None:
+    """Its torques and its positions too; what is missing is asked for by the name of its option."""
+    ap = pytest.importorskip("apprehend")
+    try:
+        ap.Robot.load("ur5")
+    except ap.errors.MissingDependencyError as error:
+        pytest.skip(str(error))
+    (tmp_path / "way.csv").write_text("0,-1.2,1,0,0.5,0\n0.5,-1,1.4,0.3,0.5,1\n0.3,-0.8,0.7,0.2,0.1,-0.5\n")
+    options = ("way.csv", "--robot", "ur5", "--acceleration", "5", "--grid", "80")
+    result = run(*options, "--torque", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "torques proven too: largest excess over any limit 0" in result.stdout
+    (tmp_path / "way.csv").write_text("0,0,0,0,0,0\n3,0,0,0,0,9\n")
+    result = run(*options, cwd=tmp_path)
+    assert result.returncode == 1
+    assert "position of coordinate 5 is 9" in result.stdout.replace("\n", "")
+    result = run(*options, "--straight", cwd=tmp_path)
+    assert result.returncode == 1
+    assert "a limit is exceeded: position of wrist_3_joint" in result.stdout.replace("\n", " ")
+    result = run("way.csv", "--velocity", "1", cwd=tmp_path)
+    assert result.returncode == 2
+    assert "give --acceleration" in result.stderr.replace("\n", " ")

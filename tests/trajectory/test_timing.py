@@ -155,6 +155,23 @@ def test_the_unit_of_a_path_does_not_matter(unit: float) -> None:
         assert timing.motion.continuity(1e-7) == 1
 
 
+def test_a_path_that_leaves_its_limits_of_position_is_named() -> None:
+    """A spline through points within the limits may overshoot them; no timing mends that."""
+    points = [[0.0, 0.0], [1.0, 0.1], [1.0, 1.0], [0.0, 0.9]]
+    limits = tj.Limits(velocity=1.0, acceleration=2.0, position=[[-0.1, 1.0], [-1.0, 2.0]])
+    timing = tj.time_optimal(tj.Spline(points), limits)
+    assert timing.status is tj.TimingStatus.INFEASIBLE
+    with pytest.raises(
+        UnsuccessfulError, match=r"At s = 0\.[45].*position of coordinate 0 is 1\.1.*limit is \[-0\.1, 1"
+    ):
+        timing.require_success()
+    assert tj.time_optimal(tj.polyline(points), limits).violation == 0.0
+    many = tj.time_optimal_many([tj.polyline(points), tj.Spline(points)], limits)
+    assert many.success.tolist() == [True, False]
+    assert repr(timing).startswith("Timing(No speed along the path")
+    assert repr(many).startswith("Timings(1 of 2 paths timed; path 1")
+
+
 def test_a_torn_path_is_refused() -> None:
     torn = tj.PolynomialPath([0.0, 1.0, 2.0], [[[0.0, 0.0], [1.0, 0.0]], [[5.0, 0.0], [1.0, 0.0]]])
     with pytest.raises(InputError, match=r"the path jumps by 4 at s = 1; its pieces must meet"):

@@ -22,6 +22,7 @@ def command(
     jerk: Annotated[float | None, typer.Option(help="jerk limit of every joint: makes the motion jerk-limited")] = None,
     straight: Annotated[bool, typer.Option(help="straight segments instead of a spline through the waypoints")] = False,
     deviation: Annotated[float, typer.Option(help="how far straight segments may be left to round corners")] = 0.0,
+    grid: Annotated[int, typer.Option(help="grid intervals of the time-optimal motion")] = 200,
     torque: Annotated[bool, typer.Option(help="keep the robot's torque limits too (full dynamics)")] = False,
     out: Annotated[Path | None, typer.Option(help="write the motion: .json (exact), .csv, or .ros.json")] = None,
     dt: Annotated[float, typer.Option(help="seconds between samples of .csv and .ros.json")] = 0.01,
@@ -31,6 +32,8 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
 ) -> int:
     """Time a path. Exit code 0: a motion with proven limits; 1: there is none, and why; 2: wrong input."""
+    import numpy as np
+
     from .. import trajectory as tj
     from ..errors import InputError, UnsuccessfulError
     from ..kinematics import Robot
@@ -40,13 +43,21 @@ def command(
     names = arm.joint_names if arm is not None else None
     if arm is not None and points.shape[1] != arm.n:
         raise InputError(f"{waypoints} has {points.shape[1]} columns; robot {arm.name!r} has {arm.n} joints: {names}")
+    of_arm = arm.limits if arm is not None else None
+    if acceleration is None and (of_arm is None or not np.isfinite(of_arm.acceleration).all()):
+        raise InputError(
+            f"{f'robot {arm.name!r}' if arm is not None else 'a motion without --robot'} has no acceleration limits of "
+            "its own; give --acceleration (rad/s² or m/s² of every joint)"
+        )
     limits = tj.Limits(
-        velocity=velocity if velocity is not None else arm.limits.velocity if arm is not None else None,
-        acceleration=acceleration if acceleration is not None else arm.limits.acceleration if arm is not None else None,
+        velocity=velocity if velocity is not None else of_arm.velocity if of_arm is not None else None,
+        acceleration=acceleration if acceleration is not None else of_arm.acceleration if of_arm is not None else None,
         jerk=jerk,
+        position=np.stack([of_arm.lower, of_arm.upper], axis=1) if of_arm is not None else None,
     )
     if torque and arm is None:
         raise InputError("--torque needs --robot: the torques follow from its dynamics")
+    violation = 0.0
     try:
         if straight and deviation == 0.0:
             if torque or jerk is not None:
@@ -60,7 +71,8 @@ def command(
                 motion = tj.jerk_limited(path, limits, least=8)
             else:
                 constraints = [tj.TorqueLimits(arm)] if torque and arm is not None else []
-                motion = tj.time_optimal(path, limits, constraints=constraints, least=8).require_success().motion
+                timing = tj.time_optimal(path, limits, constraints=constraints, grid=grid, least=8).require_success()
+                motion, violation = timing.motion, timing.violation
     except UnsuccessfulError as error:
         if as_json:
             print_json({"success": False, "why": str(error)})
@@ -68,6 +80,7 @@ def command(
             console.print(f"no motion: {error}")
         return 1
     report = motion.check(limits)
+    violation = max(violation, report.violation)
     if out is not None:
         _write(motion, out, dt, names)
     if picture is not None:
@@ -75,15 +88,18 @@ def command(
     facts: dict[str, Any] = {
         "success": report.success, "duration": motion.duration, "pieces": int(motion.breaks.size - 1),
         "length": tj.arc_length(motion, tolerance=1e-9), "limit": report.limit, "coordinate": report.coordinate,
-        "time": report.time, "value": report.value, "bound": report.bound, "violation": report.violation,
+        "time": report.time, "value": report.value, "bound": report.bound, "violation": violation,
     }  # fmt: skip
     if as_json:
         print_json(facts)
     else:
         joint = names[report.coordinate] if names is not None else f"q{report.coordinate + 1}"
         console.print(f"{points.shape[0]} waypoints, {points.shape[1]} joints: {motion.duration:.4f} s")
-        console.print(f"limits proven at all times; tightest: {report.limit} of {joint}, {report.value:.4g} of "
-                      f"{report.bound:.4g} at t = {report.time:.4f} s")  # fmt: skip
+        verdict = "limits proven at all times; tightest" if report.success else "a limit is exceeded"
+        console.print(f"{verdict}: {report.limit} of {joint}, {report.value:.4g} of {report.bound:.4g} "
+                      f"at t = {report.time:.4f} s")  # fmt: skip
+        if torque:
+            console.print(f"torques proven too: largest excess over any limit {violation:.1g}")
         if out is not None:
             console.print(f"written: {out}")
     return 0 if report.success else 1

@@ -119,7 +119,9 @@ def time_optimal_many(
     durations, place = np.full(len(curves), np.inf), np.full((len(curves), 2), -1)
     groups: list[_Group] = []
     ends = (start_speed, end_speed)
-    simple = not constraints and least >= 1 and all(np.isfinite(v) and v >= 0.0 for v in ends)
+    simple = (
+        not constraints and limits.position is None and least >= 1 and all(np.isfinite(v) and v >= 0.0 for v in ends)
+    )
     grid = int(grid) if isinstance(grid, np.integer) else grid
     alim = limits.pairs("acceleration", n)
     members = np.array([i for i, c in enumerate(curves) if c.degree <= 3], dtype=np.int64)

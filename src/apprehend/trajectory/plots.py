@@ -32,7 +32,7 @@ def plot(
     rows = (samples.position, samples.velocity, samples.acceleration, samples.jerk)
     if names is not None and len(names) != motion.n:
         raise InputError(f"names has {len(names)} entries; expected {motion.n}")
-    labels = names if names is not None else [f"q{j + 1}" for j in range(motion.n)]
+    labels = list(names) if names is not None else [f"q{j + 1}" for j in range(motion.n)]
     figure = _figure(8.0, 9.0)
     axes = figure.subplots(4, 1, sharex=True)
     limits = Limits.read(limits) if limits is not None else Limits()
@@ -50,7 +50,8 @@ def plot(
         axis.set_ylabel(f"{name} / limit" if shares else f"{name} ({unit})")
         axis.grid(visible=True, linewidth=0.3)
     axes[-1].set_xlabel("t (s)")
-    axes[0].legend(loc="upper right", fontsize="small", ncols=max(1, motion.n // 4))
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", fontsize="small", ncols=min(motion.n, 5))
     return figure
 
 

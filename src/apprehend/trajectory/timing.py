@@ -151,7 +151,8 @@ def time_optimal(
 
     *grid* is the number of intervals (at least *least* per piece of the path) or the grid itself; ``start_speed`` and
     ``end_speed`` are ṡ at the ends. At a kink of the path (a jump of the tangent) the motion comes to rest. A path
-    that is not made of polynomials is replaced by one (`as_polynomial`).
+    that is not made of polynomials is replaced by one (`as_polynomial`); one that leaves limits of position is
+    answered with the place.
     """
     curve = as_polynomial(path)
     limits = Limits.read(limits)
@@ -161,6 +162,9 @@ def time_optimal(
             raise InputError(f"{name} is {speed}; expected ṡ ≥ 0 along the path")
     if not constraints and not np.isfinite(alim).all():
         _refuse_unbounded(curve, alim)
+    outside = _outside(curve, limits) if limits.position is not None else None
+    if outside is not None:
+        return outside
     if least < 1:
         raise InputError(f"least is {least}; expected a number of intervals per piece ≥ 1")
     adaptive = isinstance(grid, (int, np.integer))
@@ -352,6 +356,23 @@ def make_grid(path: PolynomialPath, grid: int | ArrayLike, least: int = 1) -> Ar
     near[:-1] |= tight & ~is_break[:-1]
     near[1:] |= tight & ~is_break[1:]
     return np.ascontiguousarray(merged[~near])
+
+
+def _outside(path: PolynomialPath, limits: Limits) -> Timing | None:
+    """The answer for a path that leaves the limits of position; None for one that keeps them."""
+    pairs = limits.pairs("position", path.n)
+    found = path.extrema(0)
+    slack = 1e-9 * (1.0 + found.magnitude)
+    over = np.stack([pairs[:, 0] - found.lower, found.upper - pairs[:, 1]]) - slack
+    if not (over > 0.0).any():
+        return None
+    side, j = (int(k) for k in np.unravel_index(over.argmax(), over.shape))
+    s, value = ((found.at_lower, found.lower), (found.at_upper, found.upper))[side]
+    reason = f"position of coordinate {j} is {value[j]:.6g}; the limit is {pairs[j].tolist()}"
+    return Timing(
+        TimingStatus.INFEASIBLE, path, limits, path.breaks, np.zeros(path.breaks.size), np.zeros(path.breaks.size),
+        np.zeros((path.breaks.size - 1, 3)), float(s[j]), reason,
+    )  # fmt: skip
 
 
 def _refuse_unbounded(path: PolynomialPath, alim: Array) -> None:
