@@ -22,7 +22,7 @@ from .surface import Surface
 if TYPE_CHECKING:
     from ..collision import CollisionModel, Convex
 
-POSTURES = 6000
+POSTURES = 20000
 """Random postures that are judged as pre-grasps."""
 CAGES = 300
 """How many of them are kept."""

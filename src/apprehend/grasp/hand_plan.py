@@ -33,10 +33,12 @@ SLANT = np.radians(50.0)
 """Largest angle between the way a pad faces and the normal of its contact."""
 APART = 0.01
 """Fingers that close on one place aim this far from it, each from its own side, in m."""
+OPEN = 0.035
+"""A pre-grasp with its pads drawn back by that much must have room where it is placed, in m."""
 CLEARANCE = 1e-3
 """An open hand keeps this distance from the body, in m."""
-BACK = 0.015
-"""Pads are drawn back by this much before they close on a planned contact, in m."""
+BACK = (0.01, 0.02, 0.035, 0.055, 0.08)
+"""Pads are drawn back by the first of these that gives room before they close on a planned contact, in m."""
 WRENCHES = np.concatenate([np.eye(3), -np.eye(3)])
 """Directions of gravity when nothing is known of it."""
 
@@ -93,12 +95,19 @@ class HandSearch:
         points, normals, hit, way = self._ahead(pick, pose)
         chosen, margin = self._closed_sets(points, normals, hit)
         margin /= 1.0 + (np.where(hit, way, 0.0) ** 2).sum(axis=1) / EASY**2
-        best = np.argsort(-margin, kind="stable")[:BATCH]
-        best = best[margin[best] > 0.0]
+        order = np.argsort(-margin, kind="stable")
+        order = order[margin[order] > 0.0]
+        best = order[:0]
+        for start in range(0, min(len(order), 20 * BATCH), 4 * BATCH):
+            few = order[start : start + 4 * BATCH]
+            few = few[self._free(retract(fingers, fingers.cages.q[pick[few]], OPEN), pose[few])]
+            best = np.concatenate([best, few])[:BATCH]
+            if len(best) == BATCH:
+                break
         self.rejected["no contacts that close lie before the pads"] += BATCH - len(best)
         robot = fingers.floating
         q, success = np.zeros((len(best), robot.n)), np.zeros(len(best), np.bool_)
-        start = np.concatenate([_coordinates(pose[best], self.body.com), fingers.cages.q[pick[best]]], axis=1)
+        guess = np.concatenate([_coordinates(pose[best], self.body.com), fingers.cages.q[pick[best]]], axis=1)
         goals = np.tile(np.eye(4), (len(best), len(fingers.tips), 1, 1))
         goals[..., :3, :3], goals[..., :3, 3] = _frames(normals[best]), points[best] - self.body.com
         for pads in np.unique(chosen[best], axis=0):
@@ -106,7 +115,7 @@ class HandSearch:
             names = [f"pad_{i}" for i in np.flatnonzero(pads)]
             tolerance = np.tile([3e-3] * 3 + [0.8, 0.8, np.inf], (len(names), 1))
             answer = solve_frames(
-                robot, goals[which][:, pads], names, start[which], tolerance=tolerance, max_starts=12, rng=self.rng
+                robot, goals[which][:, pads], names, guess[which], tolerance=tolerance, max_starts=12, rng=self.rng
             )
             q[which], success[which] = answer.q, answer.success
         self.rejected["out of the fingers' reach"] += int((~success).sum())
@@ -120,7 +129,18 @@ class HandSearch:
         targets = np.where(
             chosen[best][..., None], np.einsum("nji,nkj->nki", placed[:, :3, :3], inside), fingers.pad_places(joints)[0]
         )
-        self._close(retract(fingers, joints, BACK), placed, targets, "inverse")
+        self._close(self._opened(joints, placed), placed, targets, "inverse")
+
+    def _opened(self, q: Array, pose: Array) -> Array:
+        """Joints with the pads drawn back from where they touch as little as gives room, or as much as was tried."""
+        out = q.copy()
+        left = np.arange(len(q))
+        for back in BACK:
+            out[left] = retract(self.fingers, q[left], back)
+            left = left[~(self._free(out[left], pose[left]) & self.fingers.own.free(out[left]))]
+            if not len(left):
+                break
+        return out
 
     def _ahead(self, pick: IntArray, pose: Array) -> tuple[Array, Array, BoolArray, Array]:
         """Where each pad of placed pre-grasps would meet the surface going the way it faces: points and inward normals
