@@ -80,6 +80,69 @@ def test_six_joints(name: str, seed: int) -> None:
     check(robot, q, sol, "tip")
 
 
+def general_arms(seed: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Axes of arms that have neither a spherical wrist or shoulder nor three parallel axes."""
+    rng = np.random.default_rng(seed)
+    P = rng.normal(size=(7, 3)) * 0.3
+    H = np.array([unit(rng) for _ in range(6)])
+    out = {"any": (H, P)}
+    for name, parallel, meeting in (
+        ("two meet at the tool", (), (5,)),
+        ("two meet at the base", (), (1,)),
+        ("two pairs meet", (), (1, 5)),
+        ("parallel 1 2", (1,), ()),
+        ("parallel 2 3", (2,), ()),
+        ("parallel 1 2 and 4 5", (1, 4), ()),
+        ("parallel 3 4, two pairs meet", (3,), (1, 5)),
+    ):
+        h, p = H.copy(), P.copy()
+        for joint in parallel:
+            h[joint] = h[joint - 1]
+        for joint in meeting:
+            p[joint] = 0.0
+        out[name] = (h, p)
+    return out
+
+
+@pytest.mark.parametrize("name", list(general_arms(0)))
+def test_six_joints_in_any_position(name: str) -> None:
+    for seed in (1, 2):
+        robot = from_axes(*general_arms(seed)[name], random_rotation(np.random.default_rng(seed)))
+        q = configurations(robot, 60, seed)
+        sol = ik.branches(robot, robot.fk(q, "tip"))
+        assert sol.family == "six revolute joints in any position"
+        assert (sol.found <= 16).all()
+        check(robot, q, sol, "tip")
+        # a long search finds no branch that is not among them
+        many = ik.solve(robot, robot.fk(q[:10], "tip"), "tip", n_solutions=16, distinct=1e-3, max_starts=600)
+        for i in range(10):
+            for row in many.solutions(i):
+                assert apart(sol.solutions(i), row).min() < 1e-3
+
+
+def test_the_general_arm_far_away_and_large_has_the_same_branches() -> None:
+    H, P = general_arms(3)["any"]
+    robot = from_axes(H, P)
+    big = from_axes(H, 40.0 * P)
+    q = configurations(robot, 40)
+    assert (ik.branches(robot, robot.fk(q, "tip")).found == ik.branches(big, big.fk(q, "tip")).found).all()
+    T = np.eye(4)
+    T[:3, 3] = (50.0, -20.0, 3.0)
+    far = robot.placed(T)
+    sol = ik.branches(far, far.fk(q, "tip"))
+    assert max(apart(sol.solutions(i), q[i]).min(initial=9.0) for i in range(40)) < 1e-6
+    assert ik.branches(robot, far.fk(q[0], "tip")).status is BranchStatus.OUT_OF_REACH
+
+
+def test_seven_joints_in_any_position_with_one_locked() -> None:
+    rng = np.random.default_rng(5)
+    robot = from_axes(np.array([unit(rng) for _ in range(7)]), rng.normal(size=(8, 3)) * 0.3)
+    assert ik.redundant_joint(robot, "tip") == "j2"
+    q = configurations(robot, 60)
+    sol = ik.branches(robot, robot.fk(q, "tip"), redundancy=q[:, 2])
+    check(robot, q, sol, "tip")
+
+
 def test_the_references_have_the_same_number_of_solutions() -> None:
     for case in reference("ik_all_solutions_6r.json")["cases"]:
         robot = from_dh(case["inputs"]["links"])
@@ -98,6 +161,9 @@ def test_the_references_have_the_same_number_of_solutions() -> None:
         "IK_spherical_2_parallel",
         "IK_3_parallel",
         "IK_3_parallel_2_intersecting",
+        "IK_2_intersecting",
+        "IK_2_parallel",
+        "IK_gen_6_dof",
     ],
 )
 def test_the_published_rows_of_ik_geo(family: str) -> None:
@@ -227,9 +293,9 @@ def test_out_of_reach_and_batches() -> None:
 
 def test_what_has_no_closed_form_says_so() -> None:
     with pytest.raises(InputError, match=r"no closed form fits the 6 joints that move frame 'tip'.*ik\.solve"):
-        ik.branches(chain("RRRRRR"), np.eye(4))
-    with pytest.raises(InputError, match="no closed form fits the 7 joints"):
-        ik.branches(chain("RRRRRRR"), np.eye(4))
+        ik.branches(chain("RRRPRR"), np.eye(4))
+    with pytest.raises(InputError, match="no closed form fits the 8 joints"):
+        ik.branches(chain("RRRRRRRR"), np.eye(4))
     with pytest.raises(InputError, match="give redundancy, the angle of joint 'j2'"):
         ik.branches(srs(0), np.eye(4))
     with pytest.raises(InputError, match="redundancy has shape"):
@@ -241,4 +307,5 @@ def test_what_has_no_closed_form_says_so() -> None:
     H, P = arms(0)["parallel 2 3 4"]
     with pytest.raises(InputError, match="0 indices for a batch"):
         ik.branches(from_axes(H, P), np.eye(4)[None]).solutions()
-    assert ik.redundant_joint(two_arms(), "left_tip") is None
+    assert ik.redundant_joint(two_arms(), "left_tip") == "left_j1"
+    assert ik.redundant_joint(chain("RRRRRR"), "tip") is None

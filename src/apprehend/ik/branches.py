@@ -21,9 +21,13 @@ from ..parallel import over_ranges
 from ..result import Result, Status
 from .chain import PreparedChain, prepare
 from .flat import flat_branches, flat_structure
+from .general import general_branches
 from .structure import EXACT, Geometry, Structure, detect, idealised, lines, locked_geometry, revolute_only
 
 GRAIN = 256
+GENERAL = "six revolute joints in any position"
+ANY_JOINT = 2
+"""The joint that is locked on arms of seven revolute joints that no form fits better with another locked."""
 
 
 class BranchStatus(Status):
@@ -113,6 +117,8 @@ def _arm(robot: Robot, frame: str) -> _Arm:
                 if structure is not None:
                     known[frame] = _Arm(chain, wide, structure, joint, lines(model))
                     break
+            else:
+                known[frame] = _Arm(chain, wide, None, ANY_JOINT, lines(model))
     return known[frame]
 
 
@@ -160,8 +166,10 @@ def branches(
     Six revolute joints with three neighbouring axes that meet at one end of the arm (a wrist, or a shoulder), or with
     parallel axes 2, 3, 4 (or 3, 4, 5): up to eight branches. Seven joints that become such an arm when one is locked
     (spherical–revolute–spherical arms, the Panda): *redundancy* ``(...)`` is the angle of `redundant_joint`, in rad.
-    Planar arms of up to three joints and SCARA arms: up to two. What fits is found from the axes. An arm whose axes
-    are slightly off (a calibrated one) gets the ideal branches, refined by Newton steps on its true axes.
+    Planar arms of up to three joints and SCARA arms: up to two. Six revolute joints in any other position: up to
+    sixteen, by elimination and an eigenvalue problem (`general`), about a hundred times slower. What fits is found from
+    the axes. An arm whose axes are slightly off (a calibrated one) gets the ideal branches, refined by Newton steps on
+    its true axes.
 
     With *limits* only branches within the position limits are returned, on the turn nearest to *q0* ``(..., n)`` or to
     the middle of the limits; else all, in (−π, π]. Coordinates that do not move the frame keep *q0* or home.
@@ -178,18 +186,23 @@ def branches(
         fill = np.ascontiguousarray(np.broadcast_to(as_shaped(q0, "q0", robot.n), (*shape, robot.n)))
         fill = fill.reshape(count, robot.n)
         near = np.ascontiguousarray(fill[:, arm.chain.free])
-    if arm.locked < 0 and arm.structure is not None:
-        x, number, family = _six(arm.structure, poses)
-    elif arm.structure is not None:
+    model = robot.chain_model(frame)
+    if arm.locked >= 0:
         x, number, family = _seven(robot, frame, arm, poses, redundancy, shape)
+    elif arm.structure is not None:
+        x, number, family = _six(arm.structure, poses)
+    elif revolute_only(model) and arm.chain.free.size == 6:
+        g = lines(model)
+        x, number = general_branches(g.h[None], g.o[None], g.R0[None], poses)
+        family = GENERAL
     else:
-        flat = flat_structure(robot.chain_model(frame))
+        flat = flat_structure(model)
         if flat is None:
             raise InputError(
                 f"no closed form fits the {arm.chain.free.size} joints that move frame {frame!r} of robot "
                 f"{robot.name!r}; use ik.solve(..., n_solutions=8)"
             )
-        x, number, family = flat_branches(flat, robot.chain_model(frame), poses)
+        x, number, family = flat_branches(flat, model, poses)
     q, valid, residual, codes = _finish(arm, poses, x, number, fill, near, limits)
     return BranchResult(
         q=q.reshape(*shape, valid.shape[1], robot.n),
@@ -245,13 +258,16 @@ def _seven(
         values = np.broadcast_to(values, shape).reshape(-1)
     except ValueError as error:
         raise InputError(f"redundancy has shape {values.shape}, T has batch shape {shape}; they must match") from error
-    structure, seven = arm.structure, arm.seven
-    assert structure is not None and seven is not None  # noqa: PT018
-    at = locked_geometry(seven, joint, values)
-    h, o, R0 = idealised(structure, *at)
-    six, number = _run(structure, poses, h, o, R0)
+    assert arm.seven is not None
+    at = locked_geometry(arm.seven, joint, values)
+    if arm.structure is None:
+        six, number = general_branches(*at, poses)
+        family = GENERAL
+    else:
+        six, number = _run(arm.structure, poses, *idealised(arm.structure, *at))
+        family = arm.structure.name
     x = np.insert(six, joint, values[:, None], axis=2)
-    return np.ascontiguousarray(x), number, f"{structure.name}, with joint {name!r} locked"
+    return np.ascontiguousarray(x), number, f"{family}, with joint {name!r} locked"
 
 
 def _finish(

@@ -109,7 +109,8 @@ def detect(geometry: Geometry) -> Structure | None:
 
 
 def _reach(g: Geometry) -> float:
-    return max(float(np.linalg.norm(np.diff(g.o, axis=0), axis=1).sum()), 1e-9)
+    """Length along the axes; where the arm stands and what tool it holds do not count."""
+    return max(float(np.linalg.norm(np.diff(g.o[:6], axis=0), axis=1).sum()), 1e-9)
 
 
 def _spherical(g: Geometry, backwards: bool) -> Structure | None:
