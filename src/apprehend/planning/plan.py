@@ -77,7 +77,7 @@ def plan(
         ends = np.stack([task.start, task.goals[direct]])
         path = ends if (ends[0] != ends[1]).any() else ends[:1]
         return PlanResult(PlanStatus.SUCCESS, path, direct, seconds=time.perf_counter() - began)
-    until = began + time_limit
+    until = time.perf_counter() + time_limit  # what was compiled until here does not count
     if keep is None:
         result = _free(model, task, rng, until, began, max_nodes, simplify)
     else:
@@ -158,6 +158,7 @@ def _free(
 ) -> PlanResult:  # fmt: skip
     """RRT-Connect, and shortcuts."""
     search = Search(model, task.start, task.goals[task.usable], max_nodes)
+    until += search.compile()
     while True:
         status = search.grow(rng, task.low, task.high)
         if status != collide_plan.MORE or time.perf_counter() > until:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -48,6 +50,15 @@ class Search:
         self.nodes[1, : len(goals)] = goals
         self.samples = 0
         self.chunk = 64
+
+    def compile(self) -> float:
+        """Make sure that the kernel is compiled; the seconds that it took."""
+        began, chunk = time.perf_counter(), self.chunk
+        self.chunk = 0
+        nothing = np.zeros(self.nodes.shape[2])
+        self.grow(np.random.default_rng(0), nothing, nothing)
+        self.chunk = chunk
+        return time.perf_counter() - began
 
     def grow(self, rng: np.random.Generator, lower: Array, upper: Array) -> int:
         """Try one more portion of random configurations."""

@@ -4,6 +4,7 @@ from .contacts import show_contacts
 from .draw import render
 from .live import Page
 from .pages import show_body, show_grasp, show_robot
+from .paths import render_path, show_path
 from .picture import Camera, Image, Item, jpeg, png
 from .postures import render_postures
 from .replay import show
@@ -19,11 +20,13 @@ __all__ = [
     "jpeg",
     "png",
     "render",
+    "render_path",
     "render_postures",
     "show",
     "show_body",
     "show_contacts",
     "show_grasp",
+    "show_path",
     "show_robot",
     "write_report",
 ]
