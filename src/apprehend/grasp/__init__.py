@@ -5,6 +5,7 @@ from .closure import Closure, ClosureStatus
 from .closures import Closures, closed, force_closures
 from .contact import Contact, ContactModel
 from .files import read_grasp
+from .force_batch import optimal_forces
 from .forces import ContactForces, ForceBatch, ForceStatus
 from .grasp import Grasp
 from .hand_grasp import HandGrasp, hand_jacobian
@@ -42,6 +43,7 @@ __all__ = [
     "closed",
     "force_closures",
     "hand_jacobian",
+    "optimal_forces",
     "plan",
     "read_grasp",
     "save_picture",

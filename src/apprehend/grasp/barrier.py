@@ -49,13 +49,12 @@ def analytic_centre(
     chosen = np.flatnonzero(found)
     at, numbers = np.ascontiguousarray(forces[chosen]), np.zeros((len(chosen), 3))
 
-    factors = _factors(grasp) if len(chosen) else None
-
-    def work(i: int, j: int) -> None:
-        assert factors is not None
-        kernel.centre(grasp.null_space, cost, *factors, rows, right, stages, at[i:j], numbers[i:j])
-
-    over_ranges(work, len(chosen), 4)
+    if len(chosen):
+        factors = _factors(grasp)
+        over_ranges(
+            lambda i, j: kernel.centre(grasp.null_space, cost, *factors, rows, right, stages, at[i:j], numbers[i:j]),
+            len(chosen), 4,
+        )  # fmt: skip
     forces[chosen], measures[chosen] = at, numbers
     e = -cone.EXTRAS
     status, decrement = out[:, e], measures[:, 1]

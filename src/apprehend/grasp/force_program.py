@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import Array, IntArray, as_vector
+from ..arrays import Array, BoolArray, IntArray, as_vector
 from ..errors import InputError
 from ..kernels import cone as kernel
+from ..kernels.cone_batch import orthonormal
 from .limits import Limits, joint_torques, torque_bounds
 from .program import in_threes, layout, run
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 RANK = 1e-11
 """Singular values of the balance rows below this share of the largest count as zero."""
+WEAK = 1e-6
+"""Grasps in a batch, of whose balance rows less than this is independent, are solved one by one."""
 TYPICAL = 1e-3
 """Forces are counted in units of the wrench, but at least of this share of the smallest limit."""
 
@@ -28,11 +31,11 @@ TYPICAL = 1e-3
 class Parts:
     """What the cone programs of N grasps of one kind are made of: contacts of the same models in the same order.
 
-    ``G (N, p, m)`` scaled; ``maps (N, m, n)`` from cone coordinates to forces; the rest they share: the interior
-    element ``e (n,)``, ``links (L, n)``, the *cones*, the rows of normal forces, and how contacts share the rows.
+    ``wrenches (N, p, n)`` of cone coordinates, scaled; ``maps (N, m, n)`` from them to forces; the rest they share:
+    the interior element ``e (n,)``, ``links (L, n)``, the *cones*, and the rows of normal forces.
     """
 
-    G: Array
+    wrenches: Array
     maps: Array
     e: Array
     links: Array
@@ -40,7 +43,7 @@ class Parts:
     normals: IntArray
     friction: Array  # (N, k)
     torsion: Array  # (N, k)
-    scale: Array  # (p,)
+    scale: Array  # (N, p)
     grasp: Grasp  # one of them
 
     @classmethod
@@ -51,12 +54,12 @@ class Parts:
         maps, e, links = _stacked(grasp)
         normals = np.array([s.start + normal_index(c) for c, s in zip(grasp.contacts, grasp.slices, strict=True)])
         friction, torsion = (np.array([[getattr(c, name) for c in grasp.contacts]]) for name in ("friction", "torsion"))
-        G = (grasp.matrix * grasp.scale[:, None])[None]
+        wrenches = (grasp.matrix * grasp.scale[:, None] @ maps)[None]
         cones = tuple(size for cc in grasp.cones for size in cc.cones)
-        return cls(G, maps[None], e, links, cones, normals, friction, torsion, grasp.scale, grasp)
+        return cls(wrenches, maps[None], e, links, cones, normals, friction, torsion, grasp.scale[None], grasp)
 
     def __len__(self) -> int:
-        return len(self.G)
+        return len(self.wrenches)
 
 
 class _Builder:
@@ -137,6 +140,7 @@ class Program:
     onto: Array  # (N, rank, first rows)
     missed: Array  # (first rows, first rows − rank); one grasp only
     unit: float  # the first factor
+    weak: BoolArray  # (N,): to be solved one by one
     names: dict[int, str]
     sizes: Array  # (rows, N)
     torque: tuple[Array, Array] | None  # J_H, offset
@@ -163,16 +167,16 @@ class Program:
 def build(parts: Parts, objective: str, limits: Limits, weights: Array | None = None) -> Program:
     """The cone programs for an objective and limits."""
     builder = _Builder(parts)
-    maps, links = parts.maps, np.broadcast_to(parts.links, (len(parts), *parts.links.shape))
+    maps, wrenches = parts.maps, parts.wrenches
+    links = np.broadcast_to(parts.links, (len(parts), *parts.links.shape))
     unit, margin = np.ones(len(parts)), -1
     if objective == "max_margin":  # f = maps (x + t e'), with the smallest eigenvalue of P as t
         margin = builder.cone(1)
         shift = _eigen_units(parts)
         unit = shift.max(axis=1)  # t is counted in the finest of these, so that its column is of order one
         shift = (shift / unit[:, None])[..., None]
-        maps = np.concatenate([maps, maps @ shift], axis=2)
-        links = np.concatenate([links, links @ shift], axis=2)
-    for rows in (parts.G @ maps, links):
+        maps, links, wrenches = (np.concatenate([v, v @ shift], axis=2) for v in (maps, links, wrenches))
+    for rows in (wrenches, links):
         for i in range(rows.shape[1]):
             builder.equation(rows[:, i], kind=kernel.BALANCE)
     first = len(builder.rows)
@@ -183,28 +187,24 @@ def build(parts: Parts, objective: str, limits: Limits, weights: Array | None = 
         c, factor = np.zeros(builder.n), -1.0 / unit
         c[margin] = -1.0
     A, b0 = builder.arrays()
-    onto, missed = _orthonormal(A[:, :first])
-    rows_in = len(b0[0]) - first + onto.shape[1]
-    p = parts.G.shape[1]
-    columns = np.zeros((len(parts), builder.n, in_threes(rows_in) + 2))
-    columns[:, :, : onto.shape[1]] = (onto @ A[:, :first]).transpose(0, 2, 1)
-    columns[:, :, onto.shape[1] : rows_in] = A[:, first:].transpose(0, 2, 1)
+    columns, onto, missed, weak = _columns(A, first)
+    rows_in, p = A.shape[1] - first + onto.shape[1], parts.wrenches.shape[1]
     columns[:, : len(c), -2] = c
     columns[:, : Q.shape[1], -1] = Q
     right = np.zeros((len(parts), in_threes(rows_in), 1 + p))
     right[:, onto.shape[1] : rows_in, 0] = b0[:, first:]
-    right[:, : onto.shape[1], 1:] = -onto[:, :, :p] * parts.scale
+    right[:, : onto.shape[1], 1:] = -onto[:, :, :p] * parts.scale[:, None]
     kinds = np.full(in_threes(rows_in), kernel.COUPLING)
     kinds[: onto.shape[1]] = kernel.BALANCE
     kinds[onto.shape[1] : rows_in] = builder.kinds[first:]
-    full_maps = np.zeros((len(parts), parts.maps.shape[1], builder.n))
+    full_maps = np.zeros((len(maps), maps.shape[1], builder.n))
     full_maps[:, :, : maps.shape[2]] = maps
     B = np.zeros((A.shape[1], p))
-    B[:p] = np.diag(parts.scale)
+    B[:p] = np.diag(parts.scale[0])
     return Program(
         A, b0, B, np.array(builder.cones), full_maps, factor, 2 if Q.any() else 1, columns, right, kinds,
-        _floor(b0[:, first:], kinds[onto.shape[1] : rows_in], objective), onto, missed, float(factor[0]), builder.names,
-        np.array(builder.sizes), torque,
+        _floor(b0[:, first:], kinds[onto.shape[1] : rows_in], objective), onto, missed, float(factor[0]), weak,
+        builder.names, np.array(builder.sizes), torque,
     )  # fmt: skip
 
 
@@ -277,14 +277,23 @@ def _objective(
     return np.zeros(0), none, ones  # "feasible", and "max_margin", which has its own column
 
 
-def _orthonormal(A: Array) -> tuple[Array, Array]:
-    """Maps T ``(N, rank, rows)`` for which ``T A`` has orthonormal rows, and what A ``(N, rows, n)`` misses."""
-    U, s, _ = np.linalg.svd(A, full_matrices=True)
-    rows = A.shape[1]
-    s = np.concatenate([s, np.zeros((len(s), rows - s.shape[1]))], axis=1)
-    rank = int((s[0] > RANK * max(float(s[0, 0]), 1e-300)).sum())
-    onto = (U[:, :, :rank] / s[:, None, :rank]).transpose(0, 2, 1)
-    return np.ascontiguousarray(onto), U[0, :, rank:].copy()
+def _columns(A: Array, first: int) -> tuple[Array, Array, Array, BoolArray]:
+    """The columns for the kernel, with room for c and Q: the *first* rows of ``A (N, rows, n)`` made orthonormal by
+    *onto*, the others behind them. Then what the first rows miss, and which grasps are too weak for a batch."""
+    count, rows, n = A.shape
+    weak = np.zeros(count, np.bool_)
+    if count == 1:
+        U, s, _ = np.linalg.svd(A[0, :first], full_matrices=True)
+        rank = int((s > RANK * max(float(s[0]), 1e-300)).sum())
+        onto, missed = np.ascontiguousarray((U[:, :rank] / s[:rank]).T)[None], U[:, rank:].copy()
+        columns = np.zeros((1, n, in_threes(rows - first + rank) + 2))
+        columns[0, :, :rank] = (onto[0] @ A[0, :first]).T
+    else:
+        rank, onto, missed = first, np.empty((count, first, first)), np.zeros((first, 0))
+        columns = np.zeros((count, n, in_threes(rows) + 2))
+        orthonormal(np.ascontiguousarray(A[:, :first]), WEAK, onto, columns, weak)
+    columns[:, :, rank : rank + rows - first] = A[:, first:].transpose(0, 2, 1)
+    return columns, onto, missed, weak
 
 
 def _eigen_units(parts: Parts) -> Array:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, BoolArray, IntArray, as_array, as_shaped, as_vector, choice
+from ..arrays import Array, BoolArray, IntArray, as_shaped, as_vector, choice
 from ..errors import InputError
 from ..kernels import cone as kernel
 from ..result import Result, Status
 from .force_program import Parts, Program, answers, build, missed_direction, refuse
-from .limits import NO_LIMITS, Limits
+from .limits import NO_LIMITS, Limits, check_limits
 from .program import MOST_STEPS
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ OBJECTIVES = (
 )  # fmt: skip
 ACTIVE = 1e-6
 """Relative slack below which a limit counts as reached."""
-WARM = 0.1
+WARM = 0.02
 """How far an earlier answer is moved towards the middle of the cones before a method starts from it."""
 _FLOAT = np.dtype(np.float64)
 
@@ -86,17 +86,20 @@ class ContactForces(Result):
         p = self.grasp.wrench_size
         if self.status is not ForceStatus.INFEASIBLE:
             return np.zeros(p)
-        missed = missed_direction(self.program, self.wrench) if self.program.missed.shape[1] else None
-        if missed is not None:
-            return missed
-        return self.program.direction(self.answer[self.program.cuts[1]], p)
+        missed = self._missed
+        return self.program.direction(self.answer[self.program.cuts[1]], p) if missed is None else missed
+
+    @cached_property
+    def _missed(self) -> Array | None:
+        """The certificate where no forces whatever balance the wrench."""
+        return missed_direction(self.program, self.wrench) if self.program.missed.shape[1] else None
 
     @cached_property
     def multipliers(self) -> dict[str, float]:
         """By limit, how fast the value falls as the limit grows; of the certificate's proof where it is infeasible."""
         program = self.program
         y, first = self.answer[program.cuts[1]], len(program.missed)
-        scale = 1.0
+        scale = 0.0 if self.status is ForceStatus.INFEASIBLE and self._missed is not None else 1.0
         if self.status is ForceStatus.OPTIMAL:
             scale = float(program.factor[0]) * float(self.answer[-1]) ** (program.power - 1)
         shift = program.onto.shape[1] - first
@@ -154,6 +157,11 @@ class ForceBatch:
         """Which are optimal ``(N,)``."""
         ok: BoolArray = self.codes == kernel.OPTIMAL
         return ok
+
+    def put(self, i: int, one: ForceBatch) -> None:
+        """Set entry *i* to the only one of another batch."""
+        for mine, other in zip(vars(self).values(), vars(one).values(), strict=True):
+            mine[i] = other[0]
 
     def status(self, i: int | tuple[int, ...]) -> ForceStatus:
         """The outcome of wrench *i*."""
@@ -290,9 +298,7 @@ def _program(grasp: Grasp, objective: str, limits: Limits | None, weights: Array
     choice(objective, "objective", OBJECTIVES)
     limits = NO_LIMITS if limits is None else limits
     weight = None if weights is None else as_vector(weights, "weights", len(grasp))
-    for name, value in (("normal", limits.normal), ("total", limits.total)):
-        if value is not None and float(np.min(as_array(value, f"limits.{name}", finite=False))) < 0.0:
-            raise InputError(f"limits.{name} is {value}; a normal force cannot be limited below zero")
+    check_limits(limits)
     content: Any = tuple(
         None if v is None else np.asarray(v, np.float64).tobytes() for v in (*vars(limits).values(), weight)
     )

@@ -36,6 +36,13 @@ class Limits:
 NO_LIMITS = Limits()
 
 
+def check_limits(limits: Limits) -> None:
+    """Raise `InputError` for negative limits of normal forces."""
+    for name, value in (("normal", limits.normal), ("total", limits.total)):
+        if value is not None and float(np.min(as_array(value, f"limits.{name}", finite=False))) < 0.0:
+            raise InputError(f"limits.{name} is {value}; a normal force cannot be limited below zero")
+
+
 def with_torques(limits: Limits | None, torque_limits: ArrayLike, hand_jacobian: ArrayLike | None) -> Limits:
     """*limits* with the joint torques bounded by *torque_limits* ``(n,)`` either way or ``(n, 2)`` pairs."""
     limits = limits or NO_LIMITS

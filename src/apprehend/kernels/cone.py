@@ -145,11 +145,11 @@ def _measure(A, V_, R, K, degree):  # type: ignore[no-untyped-def]
 
 @kernel
 def _keep(V_, R, K, best):  # type: ignore[no-untyped-def]
-    """Remember the best iterate of each place and its figures."""
+    """Remember the best iterate of each place and its figures; may be called again without a step between."""
     n, rows = V_.shape[1], R.shape[1]
     worst, least, since = load(K, WORST), load(K, LEAST), load(K, SINCE)
     better = worst < least
-    store(K, SINCE, where(better, where(worst > 0.5 * least, since, 0.0), since + 1.0))
+    store(K, SINCE, where(better, where(worst > 0.5 * least, since - 1.0, 0.0), since))
     store(K, LEAST, where(better, worst, least))
     share = 1.0 / load(K, TAU)
     for j in range(n):
@@ -316,7 +316,7 @@ def _move(alpha, tau, kappa, V_, R, K):  # type: ignore[no-untyped-def]
     scale = where(t < 1e-3, 1.0 / t, where(t > 1e3, 1.0 / t, 1.0))
     store(K, TAU, where(good, scale * tau, load(K, TAU)))
     store(K, KAPPA, where(good, scale * kappa, load(K, KAPPA)))
-    store(K, SINCE, where(good, load(K, SINCE), 99.0))
+    store(K, SINCE, where(good, load(K, SINCE) + 1.0, 99.0))
     store(K, STEPS, load(K, STEPS) + 1.0)
     for j in range(V_.shape[1]):
         a, b = load2(V_, X, j), load2(V_, Z, j)
