@@ -194,6 +194,77 @@ def test_what_happens_between_the_samples_is_accounted_for(monkeypatch) -> None:
     assert "noise varies too fast between the samples" in coarse.explain()
 
 
+def test_a_given_grid_that_is_too_coarse_is_named(robot: ap.Robot) -> None:
+    """A grid that the caller gives is kept; a number of intervals is refined where it has to be."""
+    path = spline(robot, 2)
+    still = np.abs(robot.gravity(path(np.linspace(0.0, 1.0, 300)))).max(axis=0)
+    torque = tj.TorqueLimits(robot, np.maximum(0.1 * robot.limits.effort, 1.3 * still))
+    grids = [np.linspace(0.0, 1.0, k) for k in range(3, 13)]
+    answers = [tj.time_optimal(path, limits(robot), constraints=[torque], grid=g) for g in grids]
+    coarse = [a for a in answers if a.status is tj.TimingStatus.COARSE]
+    assert coarse
+    assert "limit would have to be held back" in coarse[-1].explain()
+    assert all(a.violation <= 1e-9 for a in answers if a.success)
+    fine = tj.time_optimal(path, limits(robot), constraints=[torque], grid=3)
+    assert fine.require_success().grid.size > 10
+
+
+def test_all_limits_together(robot: ap.Robot) -> None:
+    path, frame = spline(robot, 7), tool(robot)
+    still = np.abs(robot.gravity(path(np.linspace(0.0, 1.0, 300)))).max(axis=0)
+    effort = np.maximum(robot.limits.effort, 1.3 * still)
+    effort[-1] = np.inf
+    together = [
+        tj.TorqueLimits(robot, effort), tj.PowerLimits(robot, 30.0), tj.CartesianSpeed(robot, frame, linear=0.4),
+        tj.CartesianAcceleration(robot, frame, linear=2.0),
+    ]  # fmt: skip
+    whole = tj.time_optimal(path, limits(robot), constraints=together, grid=80).require_success()
+    assert whole.violation <= 1e-9
+    for one in together:
+        assert whole.duration >= tj.time_optimal(path, limits(robot), constraints=[one], grid=80).duration * 0.99
+    # with no limits on joints, those of torque alone do
+    assert tj.time_optimal(path, tj.Limits(), constraints=together[:1], grid=80).violation == 0.0
+    # a frame that does not move is never too fast
+    root = tj.CartesianAcceleration(robot, robot.frame_names[0], linear=1.0)
+    still_frame = tj.time_optimal(path, limits(robot), constraints=[root], grid=80)
+    assert still_frame.duration == pytest.approx(tj.time_optimal(path, limits(robot), grid=80).duration)
+
+
+def test_a_path_for_another_robot_is_refused(robot: ap.Robot) -> None:
+    path, frame = tj.polyline([[0.0, 0.0], [1.0, 1.0]]), tool(robot)
+    for limit in (
+        tj.TorqueLimits(robot), tj.PowerLimits(robot, 1.0), tj.CartesianSpeed(robot, frame, linear=1.0),
+        tj.CartesianAcceleration(robot, frame, linear=1.0),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=f"the path has 2 coordinates; {type(limit).__name__} is for robot"):
+            tj.time_optimal(path, tj.Limits(1.0, 1.0), constraints=[limit])
+
+
+def test_rows_of_a_wrong_shape_are_refused() -> None:
+    class Flat:
+        def rows(self, path, s):
+            zero = np.zeros((s.shape[0], 1))
+            return tj.Rows(zero, zero, zero, np.zeros(1), np.ones(1), ("flat",))
+
+    class Loose(Flat):
+        def rows(self, path, s):
+            zero = np.zeros((*s.shape, 1))
+            return tj.Rows(zero, zero, zero, np.zeros(2), np.ones(1), ("loose",))
+
+    class Wild(Flat):
+        def rows(self, path, s):
+            wild = np.full((*s.shape, 1), np.nan)
+            return tj.Rows(wild, wild, wild, np.zeros(1), np.ones(1), ("wild",))
+
+    for bad, message in (
+        (Flat(), r"Flat gives A of shape \(20, 1\); expected \(20, 5, 1\)"),
+        (Loose(), r"Loose gives lower of shape \(2,\); expected \(1,\)"),
+        (Wild(), "Wild is not finite at s = 0 of the path"),
+    ):
+        with pytest.raises(InputError, match=message):
+            tj.time_optimal(tj.polyline([[0.0], [1.0]]), tj.Limits(1.0, 1.0), constraints=[bad], grid=20)
+
+
 def test_custom_path_is_replaced_by_polynomials() -> None:
     class Circle:
         n = 2

@@ -22,7 +22,7 @@ from ..kernels import jets
 
 if TYPE_CHECKING:
     from ..kinematics import Robot
-    from .path import PolynomialPath
+    from .path import Path, PolynomialPath
 
 DIRECTIONS = 32
 """Sides of the polygon inside the disc of allowed Cartesian accelerations (0.5 % below the disc at worst)."""
@@ -79,9 +79,18 @@ class TorqueLimits:
 
     def rows(self, path: PolynomialPath, s: Array) -> Rows:
         """The dynamics along the path."""
+        _same_coordinates(self, path)
         A, B, C = dynamics_along(self.robot, path, s)
         names = tuple(f"torque of {name!r}" for name in self.robot.joint_names)
         return Rows(A, B, C, -self.effort, self.effort, names, _torque_error(self.robot, path, s, power=False))
+
+
+def _same_coordinates(limit: TorqueLimits | PowerLimits | CartesianSpeed | CartesianAcceleration, path: Path) -> None:
+    if path.n != limit.robot.n:
+        raise InputError(
+            f"the path has {path.n} coordinates; {type(limit).__name__} is for robot {limit.robot.name!r} with "
+            f"{limit.robot.n}: {', '.join(limit.robot.joint_names)}"
+        )
 
 
 def dynamics_along(robot: Robot, path: PolynomialPath, s: Array) -> tuple[Array, Array, Array]:
@@ -124,6 +133,7 @@ class PowerLimits:
 
     def rows(self, path: PolynomialPath, s: Array) -> Rows:
         """``τ_j q'_j``, the power per path speed, and its negative."""
+        _same_coordinates(self, path)
         dq = path(s, 1)
         A, B, C = (np.concatenate([v * dq, -v * dq], axis=-1) for v in dynamics_along(self.robot, path, s))
         names = tuple(f"power of {name!r}" for name in self.robot.joint_names) * 2
@@ -142,6 +152,7 @@ class CartesianSpeed:
 
     def rows(self, path: PolynomialPath, s: Array) -> Rows:
         """``|v'|² x ≤ v²``, scaled to 1."""
+        _same_coordinates(self, path)
         twist = np.einsum("...ij,...j->...i", self.robot.jacobian(path(s), self.frame), path(s, 1))
         B = np.stack([(twist[..., part] ** 2).sum(axis=-1) / v**2 for part, v, _ in self.limits], axis=-1)
         names = tuple(f"{name} speed of {self.frame!r}" for _, _, name in self.limits)
@@ -171,6 +182,7 @@ class CartesianAcceleration:
         """Half-planes ``d·(p' u + p'' x) ≤ a cos(π/m)`` inside the disc."""
         from ..kinematics import acceleration
 
+        _same_coordinates(self, path)
         q, dq, ddq = path(s), path(s, 1), path(s, 2)
         twists = np.einsum("...ij,...j->...i", self.robot.jacobian(q, self.frame), dq)
         bends = acceleration(self.robot, q, dq, ddq, self.frame)

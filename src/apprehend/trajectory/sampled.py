@@ -88,11 +88,12 @@ class Sampled:
         u = np.abs(np.diff(x) / (2.0 * np.diff(grid)))
         top = np.maximum(x[1:], x[:-1])
         found: Array = error[..., 0] * u[:, None] + error[..., 1] * top[:, None] + error[..., 2]
-        if self.across.any():
+        rows = self.across.any(axis=(0, 2))
+        if rows.any():
             # a vector of length r with the part o at right angles leaves √(r² − o²) to the rows
-            size = np.maximum(self.bounds[..., 1], 1e-300)
-            share = np.minimum((self.across[..., 0] * u[:, None] + self.across[..., 1] * top[:, None]) / size, 1.0)
-            found = found + np.where(self.across.any(axis=2), size * (1.0 - np.sqrt(1.0 - share**2)), 0.0)
+            size, across = self.bounds[:, rows, 1], self.across[:, rows]
+            share = np.minimum((across[..., 0] * u[:, None] + across[..., 1] * top[:, None]) / size, 1.0)
+            found[:, rows] += size * (1.0 - np.sqrt(1.0 - share**2))
         return found
 
     def excess(self, x: Array, grid: Array) -> float:

@@ -34,6 +34,8 @@ POWER_GAIN = 3e-4
 """Share of the duration below which a further one is not tried."""
 WIDEST_MARGIN = 0.01
 """Share of a sampled limit that an interval may hold back before it is divided."""
+SMALL_GRID = 64
+"""Grids up to this size are refined before constraints are called infeasible."""
 REFINEMENTS = 3
 """How often the intervals of a grid are divided for that."""
 
@@ -188,6 +190,8 @@ def _constrained(problem: _Problem, constraints: Sequence[Constraint], adaptive:
         if timing.success and found.power.any():
             timing, shares = _within_power(problem, found, timing)
         parts = np.where(shares > WIDEST_MARGIN, np.ceil(np.minimum(5.0 * shares / WIDEST_MARGIN, 1e4) ** 0.2), 1.0)
+        if timing.status is TimingStatus.INFEASIBLE and problem.grid.size <= SMALL_GRID:
+            parts = np.maximum(parts, 2.0)  # what a coarse grid cannot do, a finer one may
         if not adaptive or last == 0 or parts.max() == 1.0:
             break
         grid = problem.grid
@@ -263,14 +267,19 @@ def _with_margins(problem: _Problem, found: Sampled, tangent: Array | None) -> t
     for _ in range(MARGIN_ROUNDS):
         timing = problem.solve(found.tightened(margins, tangent))
         if not timing.success:
-            return timing, exact.shares(margins, timing.speed**2, problem.grid)
+            if not margins.any():
+                return timing, exact.shares(margins, timing.speed**2, problem.grid)
+            break
         short = exact.remainder(timing.speed**2, problem.grid) - margins
         if (short <= 0.0).all():
             shares = exact.shares(margins, timing.speed**2, problem.grid)
             return replace(timing, margin=float(shares.max()), sampled=exact), shares
         margins += 1.25 * np.maximum(short, 0.0)
-    i, e = (int(k) for k in np.unravel_index(short.argmax(), short.shape))
-    reason = f"{found.names[e]} varies too fast between the samples of this grid"
+    size = np.abs(exact.bounds).min(axis=2)
+    share = np.divide(margins, size, out=np.zeros_like(margins), where=np.isfinite(size) & (size > 0.0))
+    i, e = (int(k) for k in np.unravel_index(share.argmax(), share.shape))
+    held = "more than its whole limit" if share[i, e] >= 1.0 else f"{100.0 * share[i, e]:.3g} % of its limit"
+    reason = f"{found.names[e]} varies too fast between the samples of this grid: {held} would have to be held back"
     shares = exact.shares(margins, timing.speed**2, problem.grid)
     return replace(timing, status=TimingStatus.COARSE, s=float(problem.grid[i]), reason=reason), shares
 
