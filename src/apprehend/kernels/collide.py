@@ -77,7 +77,7 @@ def make_space(model):
     return CollideSpace(poses, shapes, balls, memory, ws, depth_scratch(), obstacle_stack())
 
 
-@kernel
+@kernel(borrow=True)
 def move_joints(links, joints, q, poses):
     """Moved frames of all joints at ``q (n,)``."""
     for i in range(links.shape[0]):
@@ -99,7 +99,7 @@ def move_joints(links, joints, q, poses):
                 T[9 + k] += value * T[3 * k + 2]
 
 
-@kernel
+@kernel(borrow=True)
 def place(model, q, space):
     """Put the tree at *q*: poses of joints, bounding spheres of nodes and shapes; poses of shapes follow on demand."""
     ints, floats, nodes = model.shapes.ints, model.shapes.floats, model.nodes
@@ -122,7 +122,7 @@ def place(model, q, space):
             shapes[g, DONE] = 0.0
 
 
-@kernel
+@kernel(borrow=True)
 def finish(ints, floats, poses, shapes, g):
     """World pose of shape *g*, composed on demand."""
     if shapes[g, DONE] == 0.0:
@@ -130,7 +130,7 @@ def finish(ints, floats, poses, shapes, g):
         shapes[g, DONE] = 1.0
 
 
-@kernel
+@kernel(borrow=True)
 def ball_to_box(floats, shapes, a, b):
     """Distance between the bounding sphere of shape *a* and the oriented box of shape *b*: a lower bound."""
     T, C = shapes[b], shapes[a]
@@ -141,7 +141,7 @@ def ball_to_box(floats, shapes, a, b):
     return math.sqrt(dx * dx + dy * dy + dz * dz) - floats[a, 7]
 
 
-@kernel
+@kernel(borrow=True)
 def ball_to_ball(floats, shapes, a, b):
     """Distance between the bounding spheres of two shapes."""
     x = shapes[a, CENTRE] - shapes[b, CENTRE]
@@ -150,14 +150,14 @@ def ball_to_ball(floats, shapes, a, b):
     return math.sqrt(x * x + y * y + z * z) - floats[a, 7] - floats[b, 7]
 
 
-@kernel
+@kernel(borrow=True)
 def node_gap(nodes, balls, a, b):
     """Distance between the bounding spheres of two nodes."""
     x, y, z = balls[a, 0] - balls[b, 0], balls[a, 1] - balls[b, 1], balls[a, 2] - balls[b, 2]
     return math.sqrt(x * x + y * y + z * z) - nodes[a, 3] - nodes[b, 3]
 
 
-@kernel
+@kernel(borrow=True)
 def pair_gap(arrays, a, b, poses, shapes, memory, ws, big, stack, above, below, gap):
     """Bounds on the distance of shapes *a* and *b*: decided against *above* and *below*, or within a relative *gap*.
 
@@ -188,7 +188,7 @@ def pair_gap(arrays, a, b, poses, shapes, memory, ws, big, stack, above, below, 
     return lower - grown, upper - grown
 
 
-@kernel
+@kernel(borrow=True)
 def block_hit(model, space, block, margin):
     """The first pair of shapes of a block that is nearer than or at *margin*, or −1."""
     pairs, arrays, poses, shapes = model.pairs, model.shapes, space.poses, space.shapes
@@ -238,7 +238,7 @@ def block_rates(model, qa, qb, rate):
         rate[block] = total
 
 
-@kernel
+@kernel(borrow=True)
 def covered(model, space, rate, margin, resolution, wanted):
     """Part of a motion around the placed configuration that is certainly free, at most *wanted*; negative: a hit.
 
@@ -266,7 +266,7 @@ def covered(model, space, rate, margin, resolution, wanted):
     return radius
 
 
-@kernel
+@kernel(borrow=True)
 def measure(model, p, space, out, best, within):
     """Signed distance of pair *p* and whether ``out (9,)`` was written: only when it is below *best* and *within*.
 

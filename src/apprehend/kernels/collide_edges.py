@@ -11,7 +11,7 @@ from .lane_edges import edge_blocked, edge_space
 QUEUE = 4096
 
 
-@kernel
+@kernel(borrow=True)
 def scan_pieces(model, qa, qb, margin, resolution, space, rate, queue, count):
     """The pair that is hit on the first *count* pieces in ``queue``, −1 for none, and where: ``(pair, s)``.
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ._jit import kernel
 from .gjk import (
     AXIS,
@@ -42,17 +44,17 @@ def pair_many(shapes, A, B, start, stop, distance, out):
 def each_many(shapes, A, B, start, stop, distance, out):
     """The same where shape 0 is a cloud or a union."""
     ints, floats, points, graph, trees, grids = shapes
-    ws, big, stack, outer = pair_scratch(), depth_scratch(), obstacle_stack(), obstacle_stack()
+    ws, big, stack, outer, item = pair_scratch(), depth_scratch(), obstacle_stack(), obstacle_stack(), np.empty(12)
     for i in range(start, stop):
         compose(A[i], floats[0, 8:20], ws[PLACE_A])
         compose(B[i], floats[1, 8:20], ws[PLACE_B])
-        distance[i] = each_of(ints, floats, points, graph, trees, grids, ws, big, stack, outer, out[i])
+        distance[i] = each_of(ints, floats, points, graph, trees, grids, ws, big, stack, outer, item, out[i])
 
 
-@kernel
-def each_of(ints, floats, points, graph, trees, grids, ws, big, stack, outer, out):
+@kernel(borrow=True)
+def each_of(ints, floats, points, graph, trees, grids, ws, big, stack, outer, item, out):
     """The least distance of a part of shape 0, a cloud or a union, at ``ws[PLACE_A]`` to shape 1 at ``ws[PLACE_B]``."""
-    TA, TB, rel, item = ws[PLACE_A], ws[PLACE_B], ws[REL], ws[0].copy()
+    TA, TB, rel = ws[PLACE_A], ws[PLACE_B], ws[REL]
     first, count, cloud = ints[0, 1], ints[0, 2], ints[0, 0] == CLOUD
     root, levels, ra = int(floats[0, 0]), int(floats[0, 1]), floats[0, 3]
     best, other = 1e300, ints.shape[0] - 1
@@ -103,7 +105,7 @@ def each_of(ints, floats, points, graph, trees, grids, ws, big, stack, outer, ou
     return best
 
 
-@kernel
+@kernel(borrow=True)
 def ball_bound(ints, floats, grids, TA, TB, x, y, z):
     """A lower bound on the distance between a point in the frame *TA* and shape 1, placed at *TB*."""
     u = TA[0] * x + TA[1] * y + TA[2] * z + TA[9] - TB[9]
@@ -119,7 +121,7 @@ def ball_bound(ints, floats, grids, TA, TB, x, y, z):
     return math.sqrt(ax * ax + ay * ay + az * az) + min(max(max(dx, dy), dz), 0.0)
 
 
-@kernel
+@kernel(borrow=True)
 def report(TA, ws, out):
     """``out (9,)``: witness points on both shapes and the normal, from the frame of the first at *TA* into the world."""
     near, n = ws[NEAR], ws[AXIS]

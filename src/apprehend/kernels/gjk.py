@@ -55,7 +55,7 @@ MAX_STEPS = 200
 TINY = 1e-14
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def support(ints, floats, points, graph, g, dx, dy, dz, hint):
     """The point of the core of shape *g* that is farthest along (dx, dy, dz), and its vertex for the next hint."""
     kind = ints[g, 0]
@@ -110,7 +110,7 @@ def support(ints, floats, points, graph, g, dx, dy, dz, hint):
     return points[k, 0], points[k, 1], points[k, 2], best
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def relative(A, B, out):
     """``out = inv(A) B`` for poses (12,)."""
     for i in range(3):
@@ -120,7 +120,7 @@ def relative(A, B, out):
         out[9 + i] = a0 * (B[9] - A[9]) + a1 * (B[10] - A[10]) + a2 * (B[11] - A[11])
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def compose(A, B, out):
     """``out = A B`` for poses (12,)."""
     for i in range(3):
@@ -130,7 +130,7 @@ def compose(A, B, out):
         out[9 + i] = A[9 + i] + a0 * B[9] + a1 * B[10] + a2 * B[11]
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def difference(ints, floats, points, graph, a, b, dx, dy, dz, s, row):
     """Support of A − B along d, into ``row`` (w, a, b): a farthest along d, b farthest along −d."""
     rel = s[REL]
@@ -149,7 +149,7 @@ def difference(ints, floats, points, graph, a, b, dx, dy, dz, s, row):
     row[6], row[7], row[8] = bx, by, bz
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def nearest_on_segment(P, i, j, bary):
     """Barycentric coordinates of the point nearest to the origin on segment i-j of ``P``; its squared norm."""
     ax, ay, az = P[i, 0], P[i, 1], P[i, 2]
@@ -165,7 +165,7 @@ def nearest_on_segment(P, i, j, bary):
     return x * x + y * y + z * z
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def nearest_on_triangle(P, i, j, k, bary):
     """As `nearest_on_segment` for the triangle i-j-k; slivers are answered by their edges."""
     ax, ay, az = P[i, 0], P[i, 1], P[i, 2]
@@ -206,7 +206,7 @@ def nearest_on_triangle(P, i, j, k, bary):
     return best
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def side(P, i, j, k, o):
     """Signed volume with which the origin lies on the other side of face i-j-k than vertex o, relative; > 0: outside."""
     ax, ay, az = P[i, 0], P[i, 1], P[i, 2]
@@ -221,7 +221,7 @@ def side(P, i, j, k, o):
     return -to_0 if to_o > 0.0 else to_0
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def reduce_simplex(ws, n, bary):
     """Nearest point to the origin on the simplex of rows ``0 … n − 1``: keep only the rows that carry it.
 
@@ -265,7 +265,7 @@ def reduce_simplex(ws, n, bary):
     return kept, best
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def gjk(ints, floats, points, graph, a, b, ws, above, below, relative_gap):
     """Distance of the cores of shapes *a* and *b*; ``ws[REL]`` holds the pose of b in a.
 
@@ -337,7 +337,7 @@ def gjk(ints, floats, points, graph, a, b, ws, above, below, relative_gap):
     return n, min(lower, upper), upper
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def witnesses(ws, rows):
     """The nearest points of the cores, in the frame of the first shape."""
     bary = ws[BARY]

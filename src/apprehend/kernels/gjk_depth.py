@@ -35,7 +35,7 @@ def depth_scratch():
     return np.empty((MAX_POINTS + MAX_FACES, 9))
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def put_face(P, F, f, i, j, k, inner):
     """Face *f* of the polytope, wound so that its normal points away from *inner*; False for a sliver."""
     ux, uy, uz = P[j, 0] - P[i, 0], P[j, 1] - P[i, 1], P[j, 2] - P[i, 2]
@@ -56,7 +56,7 @@ def put_face(P, F, f, i, j, k, inner):
     return True
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def away_from_line(P, axis, out):
     """Two unit vectors across the line through points 0 and 1, into ``out`` (6,)."""
     ex, ey, ez = P[1, 0] - P[0, 0], P[1, 1] - P[0, 1], P[1, 2] - P[0, 2]
@@ -74,7 +74,7 @@ def away_from_line(P, axis, out):
     out[3], out[4], out[5] = ey * z - ez * y, ez * x - ex * z, ex * y - ey * x
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def tetrahedron(ints, floats, points, graph, a, b, ws, P, n, across):
     """Extend the *n* rows of ``P``, which span a simplex that holds the origin, to a tetrahedron.
 
@@ -136,7 +136,7 @@ def tetrahedron(ints, floats, points, graph, a, b, ws, P, n, across):
     return 4
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def depth(ints, floats, points, graph, a, b, ws, n, big):
     """Penetration depth of the cores, given the simplex of *n* rows of ``ws`` around the origin.
 
@@ -180,10 +180,69 @@ def depth(ints, floats, points, graph, a, b, ws, n, big):
             break
         count += 1
     deepest(P, F, faces, best, ws)
+    if best - low > 1e-9 * best + 1e-13 * size:
+        best = polish(ints, floats, points, graph, a, b, ws, P[0], best)
     return min(low, best), best
 
 
 @kernel(fast=False)
+def polish(ints, floats, points, graph, a, b, ws, row, best):
+    """A direction near ``ws[AXIS]`` with the least depth: a search along shrinking crosses, for round shapes.
+
+    The polytope has too few points for faces that are curved in two directions at once. Returns the depth there;
+    ``ws[NEAR]`` follows where the farthest points in that direction lie opposite each other.
+    """
+    axis = ws[AXIS]
+    step = 0.02
+    found = False
+    while step > 1e-10:
+        ux, uy, uz = axis[1], -axis[0], 0.0
+        if abs(axis[2]) > 0.7:
+            ux, uy, uz = 0.0, axis[2], -axis[1]
+        norm = math.sqrt(ux * ux + uy * uy + uz * uz)
+        ux, uy, uz = ux / norm, uy / norm, uz / norm
+        vx, vy, vz = axis[1] * uz - axis[2] * uy, axis[2] * ux - axis[0] * uz, axis[0] * uy - axis[1] * ux
+        moved = False
+        for trial in range(8):
+            turn = trial * 0.7853981633974483
+            c, s = step * math.cos(turn), step * math.sin(turn)
+            x, y, z = axis[0] + c * ux + s * vx, axis[1] + c * uy + s * vy, axis[2] + c * uz + s * vz
+            norm = math.sqrt(x * x + y * y + z * z)
+            x, y, z = x / norm, y / norm, z / norm
+            difference(ints, floats, points, graph, a, b, -x, -y, -z, ws, row)
+            h = -(x * row[0] + y * row[1] + z * row[2])
+            if h < best:
+                best = max(h, 0.0)
+                axis[0], axis[1], axis[2] = x, y, z
+                moved = True
+                away = (row[0] + h * x) ** 2 + (row[1] + h * y) ** 2 + (row[2] + h * z) ** 2
+                if away <= 1e-10 * h * h:
+                    found = True
+                    for i in range(6):
+                        ws[NEAR, i] = row[3 + i]
+                else:
+                    found = False
+                break
+        if not moved:
+            step *= 0.5
+    if not found:
+        lift(ws, best)
+    return best
+
+
+@kernel(fast=False)
+def lift(ws, depth):
+    """Move the deepest points apart along the axis until they are *depth* apart along it."""
+    axis, near = ws[AXIS], ws[NEAR]
+    apart = 0.0
+    for c in range(3):
+        apart += axis[c] * (near[3 + c] - near[c])
+    for c in range(3):
+        near[c] -= 0.5 * (depth - apart) * axis[c]
+        near[3 + c] += 0.5 * (depth - apart) * axis[c]
+
+
+@kernel(fast=False, borrow=True)
 def cut_away(P, F, faces, near, new, slack, inner):
     """Replace the faces that see point *new* (*near* among them) by faces from their rim to it.
 
@@ -219,7 +278,7 @@ def cut_away(P, F, faces, near, new, slack, inner):
     return alive + rims, sound
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def deepest(P, F, faces, height, ws):
     """Points of a and b whose difference comes nearest to ``−height · axis`` on the polytope, into ``ws[NEAR]``."""
     axis, bary = ws[AXIS], ws[BARY]
@@ -241,7 +300,7 @@ def deepest(P, F, faces, height, ws):
                 ws[NEAR, c] = bary[0] * ws[0, 3 + c] + bary[1] * ws[1, 3 + c] + bary[2] * ws[2, 3 + c]
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def signed_distance(ints, floats, points, graph, a, b, ws, big):
     """Signed distance of shapes *a* and *b* (negative: depth); ``ws[REL]`` holds the pose of b in a.
 

@@ -70,7 +70,7 @@ def sphere_space(model, n):
     )
 
 
-@kernel
+@kernel(borrow=True)
 def turn_lanes(joint, q, d, P, T):
     """Frames ``T (12 LANES,)`` of a revolute joint from those of its parent; its values are in ``q`` from *d* on."""
     L = LANES
@@ -99,7 +99,7 @@ def turn_lanes(joint, q, d, P, T):
         T[11 * L + lane] = P[11 * L + lane] + p0 * x + p1 * y + p2 * z
 
 
-@kernel
+@kernel(borrow=True)
 def slide_lanes(joint, q, d, P, T):
     """As `turn_lanes`, for a prismatic joint."""
     L = LANES
@@ -118,7 +118,7 @@ def slide_lanes(joint, q, d, P, T):
             T[(9 + k) * L + lane] = moved + (m * q[d + lane] + o) * w
 
 
-@kernel
+@kernel(borrow=True)
 def move_lanes(links, joints, q, poses):
     """Moved frames ``poses (m + 1, 12 LANES)`` of all joints; the last row is the world's frame."""
     for i in range(links.shape[0]):
@@ -129,7 +129,7 @@ def move_lanes(links, joints, q, poses):
             slide_lanes(joints[i], q, at(links[i, 2], 1), poses[p], poses[i])
 
 
-@kernel
+@kernel(borrow=True)
 def carry_point(poses, carrier, x, y, z, out, k):
     """Point (x, y, z) of the moved frame *carrier* (−1: the world) into components 3k … 3k + 2 of *out*."""
     L = LANES
@@ -141,7 +141,7 @@ def carry_point(poses, carrier, x, y, z, out, k):
             out[t + c * L + lane] = moved + P[(9 + c) * L + lane]
 
 
-@kernel
+@kernel(borrow=True)
 def ready_node(parts, spheres, poses, centres, ready, k):
     """Put the spheres of node *k* in place, once per block."""
     if ready[k] == 0:
@@ -150,7 +150,7 @@ def ready_node(parts, spheres, poses, centres, ready, k):
             carry_point(poses, parts[k, 0], spheres[s, 0], spheres[s, 1], spheres[s, 2], centres, s)
 
 
-@kernel
+@kernel(borrow=True)
 def count_flags(flags, row):
     """Number of lanes with a flag."""
     total = 0.0
@@ -159,7 +159,7 @@ def count_flags(flags, row):
     return int(total)
 
 
-@kernel
+@kernel(borrow=True)
 def hit_lanes(model, space, rates, margin, resolution, enough):
     """Hits of the sixteen configurations in ``space.q``: rows 0 (hard) and 1 (soft) of ``flags``.
 
