@@ -84,9 +84,10 @@ class PathPlayer:
         assert stage.robot is not None
         self.page, self.points, self.robot = page, points, stage.robot
         page.add(stage)
-        items = stage.items(points[0]) + stage.items(points[-1])
-        low, high = bounds(items)
-        page.grid(float((high - low).max()))
+        rest = len(stage.boxes) + len(stage.ghosts)
+        low, high = bounds([item for q in points[[0, -1]] for item in _cast(stage, q, rest)])
+        if not stage.boxes:
+            page.grid(float((high - low).max()))
         page.look(Camera.around(corners_of(low, high)))
         if (way := _way(stage, points, frame)) is not None:
             page.mesh("/way", way[0], way[1], WAY)
@@ -170,6 +171,12 @@ def _way(stage: Stage, points: Array, frame: str | None) -> Mesh | None:
     s = np.linspace(0.0, 1.0, CHORDS)[None, :, None]
     dense = (points[:-1, None] + s * np.diff(points, axis=0)[:, None]).reshape(-1, points.shape[1])
     return tube(stage.robot.fk(dense, frame or tool_of(stage.robot))[:, :3, 3], 0.004)
+
+
+def _cast(stage: Stage, q: Array, rest: int) -> list[Item]:
+    """Robot and bodies, without the *rest*, which reaches far."""
+    items = stage.items(q)
+    return items[: len(items) - rest] or items
 
 
 def _faded(item: Item, alpha: float) -> Item:
