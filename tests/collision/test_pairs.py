@@ -115,6 +115,39 @@ def test_touching_and_equal_shapes_have_finite_answers() -> None:
     assert signed_distance(thin, thin, np.eye(4), pose(0.5)).distance == pytest.approx(0.3, abs=1e-12)
 
 
+def test_extreme_shapes_have_exact_answers() -> None:
+    """Thin, long, far, tiny and coincident shapes."""
+    thin = Convex.box([1.0, 1.0, 1e-9])
+    assert signed_distance(thin, thin, np.eye(4), pose(0.0, 0.0, 1e-8)).distance == pytest.approx(9e-9, rel=1e-6)
+    needles = Convex.box([1e3, 1e-3, 1e-3]), Convex.box([1e-3, 1e3, 1e-3])
+    assert signed_distance(*needles, np.eye(4), pose(0.0, 0.0, 0.01)).distance == pytest.approx(0.009, abs=1e-12)
+    assert signed_distance(*needles, np.eye(4), np.eye(4)).distance == pytest.approx(-0.001, abs=1e-12)
+    can = Convex.cylinder(0.1, 0.2)
+    assert signed_distance(can, can, np.eye(4), pose(1e6)).distance == pytest.approx(1e6 - 0.2, abs=1e-6)
+    assert signed_distance(can, can, np.eye(4), np.eye(4)).distance == pytest.approx(-0.2, abs=1e-12)
+    egg = Convex.ellipsoid([0.1, 0.2, 0.3])
+    assert signed_distance(egg, egg, np.eye(4), np.eye(4)).distance == pytest.approx(-0.2, abs=1e-9)
+    cone = Convex.cone(0.1, 0.2)  # its width is least across its side: 2 r sin(atan(length / r))
+    found = signed_distance(cone, cone, np.eye(4), np.eye(4))
+    assert found.distance == pytest.approx(-0.2 * np.sin(np.arctan(2.0)), abs=1e-9)
+    gap = (found.points[0] - found.points[1]) @ found.normal
+    assert gap == pytest.approx(found.distance, abs=1e-7)
+    line = Convex.hull([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    assert signed_distance(line, Convex.box([1.0, 1.0, 1.0]), np.eye(4), pose(1.0)).distance == pytest.approx(-0.5)
+    point = Convex.hull([[0.0, 0.0, 0.0]])
+    assert signed_distance(point, point, np.eye(4), np.eye(4)).distance == 0.0
+
+
+def test_deepest_points_lie_apart_by_the_depth() -> None:
+    """Where faces are parallel, too: the deepest points of a capsule in a box, along the normal."""
+    rng = np.random.default_rng(8)
+    a, b = Convex.box([0.6, 0.4, 0.5]), Convex.capsule(0.1, 0.4)
+    for T in (pose(0.1, 0.05, 0.1), pose(0.0, 0.0, 0.2), pose(*rng.normal(size=3) * 0.1, rotation(rng))):
+        found = signed_distance(a, b, np.eye(4), T)
+        assert found.distance < 0.0
+        np.testing.assert_allclose(found.points[0] - found.points[1], found.distance * found.normal, atol=1e-8)
+
+
 def test_batches_broadcast() -> None:
     rng = np.random.default_rng(5)
     a, b = Convex.box([0.2, 0.3, 0.4]), Convex.cylinder(0.1, 0.3)
@@ -175,6 +208,13 @@ def whole_faces(points: np.ndarray) -> np.ndarray:
     [
         (lambda: Convex.box([0.1, -0.1, 0.1]), "size of a box must be positive"),
         (lambda: Convex.sphere(0.0), "radius of a sphere must be positive"),
+        (lambda: Convex.sphere("big"), "must be positive, in m; got 'big'"),
+        (lambda: Convex.box([np.inf, 1.0, 1.0]), "must be positive, in m; got inf"),
+        (lambda: Convex.hull([[np.nan, 0.0, 0.0]]), "every entry must be finite"),
+        (
+            lambda: signed_distance(Convex.sphere(1.0), Convex.sphere(1.0), np.full((4, 4), np.nan), np.eye(4)),
+            r"T_a\[0, 0\] is nan",
+        ),
         (lambda: Convex.capsule(0.1, -1.0), "length of a capsule is -1.0"),
         (lambda: Convex.cylinder(0.1, np.nan), "cylinder must be positive"),
         (lambda: Convex.hull(np.zeros((0, 3))), "at least one point"),

@@ -70,8 +70,10 @@ class Geometry:
 
 def positive(what: str, *values: float) -> None:
     """Raise `InputError` unless all *values* are positive and finite."""
-    if not all(np.isfinite(v) and v > 0.0 for v in values):
-        raise InputError(f"{what} must be positive, in m; got {', '.join(f'{v:g}' for v in values)}")
+    numbers = [v for v in values if isinstance(v, int | float | np.number) and np.isfinite(v) and v > 0.0]
+    if len(numbers) < len(values):
+        given = ", ".join(f"{v:g}" if isinstance(v, int | float | np.number) else repr(v) for v in values)
+        raise InputError(f"{what} must be positive, in m; got {given}")
 
 
 class _Point(Geometry):
