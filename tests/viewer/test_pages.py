@@ -14,6 +14,7 @@ from apprehend.errors import InputError
 from apprehend.viewer import Page, show, show_body, show_grasp, show_robot
 from apprehend.viewer.live import creased
 from apprehend.viewer.marks import along, arrow, friction_cone, tube
+from apprehend.viewer.pages import describe
 from apprehend.viewer.picture import smooth_normals
 from apprehend.viewer.record import Record
 from apprehend.viewer.replay import Player
@@ -102,6 +103,21 @@ def test_grasps_of_a_cube(ports: int) -> None:
         base = frames[hand.robot.frame_names[0]]
         expected = plan[0].pose @ np.linalg.inv(base) @ frames[page.link_names[0]]
         assert np.allclose(root, expected, atol=1e-6)
+
+
+def test_grasps_of_a_hand_with_fingers(ports: int) -> None:
+    from apprehend import grasp
+    from apprehend.kinematics import Hand
+
+    hand, ball = Hand.load("allegro_right"), Body.sphere(0.03, mass=0.05)
+    plan = grasp.plan(hand, ball, n=1, rng=np.random.default_rng(0), samples=300).require_success()
+    best = plan[0]
+    assert isinstance(best, grasp.HandCandidate)
+    with show_grasp(ball, plan.candidates, hand, port=ports, **QUIET) as page:
+        frames = dict(zip(hand.robot.frame_names, hand.robot.fk(best.q)))
+        for name in page.link_names:
+            assert np.allclose(pose_of(page._links[name]), best.pose @ frames[name], atol=1e-5)
+    assert f"{len(best.links)} contacts by {best.method}" in describe(best)
 
 
 def test_contacts_with_their_wrench_space(ports: int) -> None:

@@ -278,7 +278,10 @@ def describe(grasp: Candidate) -> str:
     from .words import quantity
 
     margins = "".join(f"\n* {k.replace('_', ' ')}: {quantity(k, v)}" for k, v in grasp.margins.items())
-    return (
-        f"**quality {grasp.quality:.3f}**, {1e3 * grasp.width:.1f} mm wide, "
-        f"needs {grasp.required_force:.1f} N at each pad\n{margins}"
-    )
+    from ..grasp import HandCandidate
+
+    if isinstance(grasp, HandCandidate):
+        how = f"{len(grasp.links)} contacts by {grasp.method}: {', '.join(grasp.links)}; up to"
+    else:
+        how = f"{1e3 * grasp.width:.1f} mm wide, needs"
+    return f"**quality {grasp.quality:.3f}**, {how} {grasp.required_force:.1f} N at each pad\n{margins}"
