@@ -15,6 +15,10 @@ NORMALS = 60
 """Directions of hull faces, the largest ones first, along which a side of the box is tried."""
 
 
+PROBES = 300
+"""Points from which orientations are chosen; sizes are fitted to all points."""
+
+
 class Ball(NamedTuple):
     """Centre ``(3,)`` (or ``(2,)``) and radius."""
 
@@ -40,21 +44,31 @@ def hull_points(points: Array) -> Array:
     """The corners of the convex hull; of flat or few points, what there is of them."""
     from scipy.spatial import ConvexHull, QhullError
 
-    points = np.unique(points, axis=0)
-    if len(points) <= points.shape[1] + 1:
-        return points
     try:
         return np.asarray(points[ConvexHull(points).vertices])
-    except QhullError:
+    except (QhullError, ValueError):  # flat, or too few
+        return np.unique(points, axis=0)
+
+
+def extreme(points: Array) -> Array:
+    """At most `PROBES` of *points* ``(V, 3)``: the farthest ones along directions all around."""
+    if len(points) <= PROBES:
         return points
+    i = np.arange(PROBES) + 0.5  # a spiral of even density
+    z, turn = 1.0 - 2.0 * i / PROBES, np.pi * (1.0 + np.sqrt(5.0)) * i
+    directions = np.stack([np.sqrt(1.0 - z * z) * np.cos(turn), np.sqrt(1.0 - z * z) * np.sin(turn), z])
+    return np.asarray(points[np.unique(np.argmax(points @ directions, axis=0))])
 
 
 def ball(points: Array) -> Ball:
     """A ball around ``points (V, d)``: the smallest but for about 1 % (Bădoiu & Clarkson 2003)."""
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     best, radius = centre, np.inf
+    columns = np.ascontiguousarray(points.T)
     for i in range(1, 100):
-        squared = ((points - centre) ** 2).sum(axis=1)
+        squared = np.zeros(len(points))
+        for column, middle in zip(columns, centre):
+            squared += (column - middle) ** 2
         far = int(np.argmax(squared))
         if squared[far] < radius * radius:
             best, radius = centre, float(np.sqrt(squared[far]))
@@ -90,13 +104,14 @@ def block(points: Array) -> Block:
         points = points[hull.vertices]
     except QhullError:
         pass
-    best = _block(points, np.eye(3))
+    probes = extreme(points)
+    best = _block(probes, np.eye(3))
     for normal in candidates:
-        best = min(best, _block(points, _turned(points, normal)), key=_size)
+        best = min(best, _block(probes, _turned(probes, normal)), key=_size)
     for _ in range(2):
         for axis in best.pose[:3, :3].T:
-            best = min(best, _block(points, _turned(points, axis)), key=_size)
-    return best
+            best = min(best, _block(probes, _turned(probes, axis)), key=_size)
+    return min(_block(points, best.pose[:3, :3]), _block(points, np.eye(3)), key=_size)
 
 
 def _size(box: Block) -> float:
@@ -159,13 +174,14 @@ def capsule(points: Array) -> Capsule:
     from scipy.optimize import minimize
 
     points = hull_points(points)
+    probes = extreme(points)
     axes = block(points).pose[:3, :3]
-    starts = [(around_axis(points, axes[:, k]), axes[:, k]) for k in range(3)]
-    best, axis = min(starts, key=lambda s: capsule_volume(s[0]))
+    starts = [(around_axis(probes, axes[:, k]), axes[:, k]) for k in range(3)]
+    _, axis = min(starts, key=lambda s: capsule_volume(s[0]))
     x, y = (v for v in axes.T if v is not axis and abs(float(v @ axis)) < 0.5)
 
     def volume(turn: Array) -> float:
-        return capsule_volume(around_axis(points, axis + turn[0] * x + turn[1] * y))
+        return capsule_volume(around_axis(probes, axis + turn[0] * x + turn[1] * y))
 
     found = minimize(
         volume,
@@ -174,7 +190,7 @@ def capsule(points: Array) -> Capsule:
         options={"maxfev": 60, "initial_simplex": [[0.0, 0.0], [0.08, 0.0], [0.0, 0.08]], "xatol": 1e-3},
     )
     better = around_axis(points, axis + found.x[0] * x + found.x[1] * y)
-    return min(best, better, key=capsule_volume)
+    return min(around_axis(points, axis), better, key=capsule_volume)
 
 
 def around_axis(points: Array, axis: Array) -> Capsule:
