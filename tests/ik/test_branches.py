@@ -302,6 +302,10 @@ def test_what_has_no_closed_form_says_so() -> None:
         ik.branches(srs(0), np.eye(4), redundancy=[0.1, 0.2])
     with pytest.raises(InputError, match="has no redundant joint"):
         ik.redundancy_intervals(from_axes(*arms(0)["parallel 2 3 4"]), np.eye(4))
+    with pytest.raises(InputError, match="samples is 1; expected 2 or more"):
+        ik.redundancy_intervals(srs(0), np.eye(4), samples=1)
+    with pytest.raises(InputError, match="tolerance is 0"):
+        ik.redundancy_intervals(srs(0), np.eye(4), tolerance=0)
     with pytest.raises(InputError, match="expected one pose"):
         ik.redundancy_intervals(srs(0), np.eye(4)[None])
     H, P = arms(0)["parallel 2 3 4"]

@@ -204,3 +204,37 @@ def test_empty_and_shaped_batches() -> None:
     assert sol.success.shape == (2, 3)
     assert sol.residual.shape == (2, 3, 2)
     assert "reaches the target" in sol.reason(1, 2)
+
+
+def test_the_preferred_solution_comes_first() -> None:
+    robot = chain("RRRRRRR", 4)
+    T = robot.fk(configurations(robot, 40), "tip")
+    wish = configurations(robot, 1, 9)[0]
+    many = ik.solve(robot, T, "tip", n_solutions=16)
+    best = ik.solve(robot, T, "tip", prefer=wish)
+    three = ik.solve(robot, T, "tip", prefer=lambda q: np.abs(q - wish).max(axis=1), n_solutions=3)
+    assert best.success.all()
+    assert np.abs(robot.fk(best.q, "tip") - T).max() < 1e-5
+    for i in range(40):
+        gaps = np.sort(np.abs(many.solutions(i) - wish).max(axis=1))
+        assert np.isclose(np.abs(best.q[i] - wish).max(), gaps[0])
+        mine = np.abs(three.solutions(i) - wish).max(axis=1)
+        assert np.allclose(mine, gaps[: len(mine)])
+    assert np.array_equal(three.q[:, 0], best.q)
+    assert best.residual.max() < 2e-6
+    with pytest.raises(InputError, match=r"prefer has shape \(2,\)"):
+        ik.solve(robot, T, "tip", prefer=[0.0, 1.0])
+    with pytest.raises(InputError, match=r"prefer returned shape \(\) for 640"):
+        ik.solve(robot, T, "tip", prefer=lambda q: 1.0)
+    with pytest.raises(InputError, match="prefer returned NaN"):
+        ik.solve(robot, T, "tip", prefer=lambda q: np.full(len(q), np.nan))
+
+
+def test_numbers_and_generators_are_checked() -> None:
+    robot = chain("RRRRRR")
+    with pytest.raises(InputError, match=r"n_solutions is 2\.5; expected a whole number"):
+        ik.solve(robot, np.eye(4), "tip", n_solutions=2.5)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="distinct is -1"):
+        ik.solve(robot, np.eye(4), "tip", n_solutions=2, distinct=-1)
+    with pytest.raises(InputError, match="rng is 3; expected a generator"):
+        ik.solve(robot, np.eye(4), "tip", rng=3)  # type: ignore[arg-type]

@@ -359,6 +359,8 @@ def test_bad_arguments_are_named() -> None:
     pose = ik.PoseTask("tip", T)
     with pytest.raises(InputError, match="tasks is empty"):
         ik.step(robot, q, [], 0.1)
+    with pytest.raises(InputError, match="tasks is one PoseTask; expected a sequence"):
+        ik.step(robot, q, pose, 0.1)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="dt is 0"):
         ik.step(robot, q, [pose], 0)
     with pytest.raises(InputError, match="damping is -1"):

@@ -305,6 +305,10 @@ def redundancy_intervals(
     if T.shape != (4, 4):
         raise InputError(f"T has shape {T.shape}; expected one pose (4, 4)")
     frame = tip_of(robot) if frame is None else frame
+    if samples < 2:
+        raise InputError(f"samples is {samples}; expected 2 or more")
+    if not tolerance > 0.0:
+        raise InputError(f"tolerance is {tolerance}; expected a positive number")
     name = redundant_joint(robot, frame)
     if name is None:
         raise InputError(f"frame {frame!r} of robot {robot.name!r} has no redundant joint")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, IntArray
+from ..errors import InputError
 from ..kernels.ik_queue import solve_queue, solve_wide
 from ..kernels.ik_seeds import nearest_starts
 from ..parallel import over_ranges
@@ -17,6 +18,22 @@ WIDE = 16
 """Batches smaller than this give all lanes to one target after the other."""
 GRAIN = 128
 """Smallest share of a batch that is worth a thread."""
+
+
+def seed_of(rng: np.random.Generator | None) -> int:
+    """The number from which random starts are made: one draw, or 0 without a generator."""
+    if rng is None:
+        return 0
+    if not isinstance(rng, np.random.Generator):
+        raise InputError(f"rng is {rng!r}; expected a generator such as np.random.default_rng(0)")
+    return int(rng.integers(1 << 62))
+
+
+def whole(value: int, name: str) -> int:
+    """*value* if it is a whole number from 1 on."""
+    if not isinstance(value, (int, np.integer)) or value < 1:
+        raise InputError(f"{name} is {value}; expected a whole number, 1 or more")
+    return int(value)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from ..arrays import IntArray, as_array, as_pose, as_shaped
 from ..errors import InputError
 from ..kinematics import Robot
 from .chain import prepare
+from .queue import seed_of, whole
 from .result import IKResult, IKStatus
 from .solve import residual_of, solve
 from .tree import WHY_STARTS, TreeProblem, nearest_in_tree, run_tree
@@ -42,7 +43,8 @@ def solve_frames(
     if all together reach them outside the limits; else CONFLICT. Its q is the nearest found: least sum over the frames
     of squared distances over the longest reach, and squared angles. Without *diagnose* it is *q0* or home.
     """
-    problem, shape = _read(robot, T, frames, q0, tolerance, max_starts, rng)
+    whole(max_starts, "max_starts")
+    problem, shape = _read(robot, T, frames, q0, tolerance, rng)
     count = problem.poses.shape[0]
     q, found, used, _ = run_tree(problem, np.arange(count), max_starts)
     certified = np.zeros((count, len(frames)), dtype=bool)
@@ -82,7 +84,6 @@ def _read(
     frames: Sequence[str],
     q0: ArrayLike | None,
     tolerance: ArrayLike,
-    max_starts: int,
     rng: np.random.Generator | None,
 ) -> tuple[TreeProblem, tuple[int, ...]]:
     """Check the arguments, and solve for each frame alone; the batch shape."""
@@ -92,8 +93,6 @@ def _read(
     T = as_pose(T, "T")
     if T.ndim < 3 or T.shape[-3] != F:
         raise InputError(f"T has shape {T.shape}; expected (..., {F}, 4, 4), one pose for each of {list(frames)}")
-    if max_starts < 1:
-        raise InputError(f"max_starts is {max_starts}; expected 1 or more")
     box = as_array(tolerance, "tolerance", finite=False)
     if box.shape not in ((), (6,), (F, 6)):
         raise InputError(f"tolerance has shape {box.shape}; expected a number, (6,) or ({F}, 6)")
@@ -117,7 +116,7 @@ def _read(
         joined[:, fresh] = one.q[:, fresh]
         moving[chain.free] = True
     guesses = np.ascontiguousarray(np.stack([start, joined], axis=1))
-    seed = 0 if rng is None else int(rng.integers(1 << 62))
+    seed = seed_of(rng)
     return TreeProblem(robot, tuple(frames), chains, poses, box, guesses, seed), shape
 
 

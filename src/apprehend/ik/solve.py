@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, BoolArray, IntArray, as_array, as_pose, as_shaped
+from ..arrays import Array, BoolArray, IntArray, as_array, as_pose, as_shaped, as_vector
 from ..errors import InputError
 from ..kernels.chain import chain_poses
 from ..kernels.ik_seeds import residuals
@@ -18,12 +18,16 @@ from ..kinematics import Robot
 from ..parallel import over_ranges
 from .chain import PreparedChain, prepare
 from .diagnose import diagnose as diagnose_failures
-from .queue import Request, run
+from .queue import Request, run, seed_of, whole
 from .result import IKResult, IKStatus
 from .tree import TreeProblem, nearest_in_tree
 
 Accept = Callable[[Array], Any]
 """Says for joint vectors ``(N, n)`` which are acceptable ``(N,)``: free of collision, for instance."""
+Cost = Callable[[Array], Any]
+"""Says what joint vectors ``(N, n)`` cost ``(N,)``."""
+CHOICE = 16
+"""Solutions of every target among which the preferred is chosen."""
 
 
 def solve(
@@ -37,6 +41,7 @@ def solve(
     distinct: float = 0.1,
     max_starts: int = 200,
     accept: Accept | None = None,
+    prefer: ArrayLike | Cost | None = None,
     diagnose: bool = True,
     rng: np.random.Generator | None = None,
 ) -> IKResult:
@@ -59,6 +64,9 @@ def solve(
     *accept* ``(N, n) -> (N,)`` booleans filters solutions (``CollisionModel.free``): up to 32 distinct ones of every
     target are tried, and targets all of whose solutions are refused get the status COLLISION.
 
+    *prefer*: a joint vector ``(n,)``, or a cost ``(N, n) -> (N,)``: of up to `CHOICE` solutions of every target
+    those nearest to it (largest difference of a joint), or cheapest, come first.
+
     Targets that are not reached get a reason and the joint vector that comes nearest (see `IKResult`); that takes some
     tenths of a millisecond each. Without *diagnose* they are NOT_FOUND, or OUT_OF_REACH where the lengths of the links
     prove it, and q is *q0* or home.
@@ -66,14 +74,20 @@ def solve(
     Coordinates that do not move *frame* keep their value of *q0*, or of ``robot.home``. Joints that may make a whole
     turn are returned on the turn nearest to *q0*, or to the middle of their limits.
     """
-    if n_solutions < 1:
-        raise InputError(f"n_solutions is {n_solutions}; expected 1 or more")
-    if max_starts < 1:
-        raise InputError(f"max_starts is {max_starts}; expected 1 or more")
+    whole(n_solutions, "n_solutions")
+    whole(max_starts, "max_starts")
+    if not distinct > 0.0:
+        raise InputError(f"distinct is {distinct}; expected a positive number")
+    if prefer is not None:
+        more = solve(
+            robot, T, frame, q0, tolerance=tolerance, n_solutions=max(CHOICE, n_solutions), distinct=distinct,
+            max_starts=max_starts, accept=accept, diagnose=diagnose, rng=rng,
+        )  # fmt: skip
+        return _preferred(robot, more, _batch(robot, as_pose(T, "T"), q0)[0], prefer, n_solutions)
     poses, fill, shape = _batch(robot, as_pose(T, "T"), q0)
     chain = prepare(robot, frame)
     box, partial, free_axis = _tolerance(tolerance, chain.reach)
-    seed = 0 if rng is None else int(rng.integers(1 << 62))
+    seed = seed_of(rng)
     request = Request(box, partial, free_axis, n_solutions, distinct, max_starts, seed)
     near = chain.middle[None] if q0 is None else fill[:, chain.free]
     problem = _Problem(
@@ -101,6 +115,32 @@ def solve(
         limiting=limiting.reshape(*shape, robot.n),
         frame=frame,
         joint_names=robot.joint_names,
+    )
+
+
+def _preferred(robot: Robot, many: IKResult, poses: Array, prefer: ArrayLike | Cost, wanted: int) -> IKResult:
+    """The same answer with the *wanted* preferred solutions of every target, the best first."""
+    shape, most = many.codes.shape, many.q.shape[-2]
+    q, found = many.q.reshape(-1, most, robot.n), many.found.reshape(-1)
+    if callable(prefer):
+        cost = np.asarray(prefer(q.reshape(-1, robot.n)), dtype=np.float64)
+        if cost.shape != (q.shape[0] * most,):
+            raise InputError(f"prefer returned shape {cost.shape} for {q.shape[0] * most} joint vectors")
+        if np.isnan(cost).any():
+            raise InputError("prefer returned NaN; expected a cost for every joint vector")
+        cost = cost.reshape(-1, most)
+    else:
+        cost = np.abs(q - as_vector(prefer, "prefer", robot.n)).max(axis=-1)
+    spare = np.arange(most) >= np.maximum(found, 1)[:, None]
+    order = np.argsort(np.where(spare, np.inf, cost), axis=1, kind="stable")[:, :wanted]
+    chosen = np.take_along_axis(q, order[..., None], axis=1)
+    chosen = np.where((np.arange(wanted) < np.maximum(found, 1)[:, None])[..., None], chosen, chosen[:, :1])
+    best = np.ascontiguousarray(chosen[:, 0])
+    return replace(
+        many,
+        q=chosen.reshape(*shape, wanted, robot.n) if wanted > 1 else best.reshape(*shape, robot.n),
+        found=np.minimum(many.found, wanted),
+        residual=residual_of(robot, many.frame, best, poses).reshape(*shape, 2),
     )
 
 

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, as_array, as_pose, as_shaped
 from ..errors import InputError
+from ..kernels.ik_faults import OUTSIDE
 from ..kernels.ik_step import steps
-from ..kernels.ik_tasks import JOINTS, OUTSIDE, TaskList
+from ..kernels.ik_tasks import JOINTS, TaskList
 from ..kinematics import Robot
 from ..parallel import over_ranges
 from ..result import Result, Status
@@ -52,6 +53,12 @@ Levels = Sequence[Task | Sequence[Task]]
 _structures: WeakKeyDictionary[Robot, dict[Any, Structure]] = WeakKeyDictionary()
 KEPT = 64
 """Lists of tasks that are remembered for every robot."""
+
+
+def _listed(tasks: Levels) -> Levels:
+    if isinstance(tasks, Task):
+        raise InputError(f"tasks is one {type(tasks).__name__}; expected a sequence, in order of priority: [task]")
+    return tasks
 
 
 def _members(level: Task | Sequence[Task]) -> Sequence[Task]:
@@ -101,7 +108,7 @@ def _build(robot: Robot, levels: Sequence[Sequence[Task]]) -> Structure:
 
 def assemble(robot: Robot, levels: Levels, q: Array) -> Program:
     """Tasks in order of priority (an inner sequence shares one level) as arrays for ``q (N, n)``."""
-    lists = [_members(level) for level in levels]
+    lists = [_members(level) for level in _listed(levels)]
     structure = structure_of(robot, lists)
     targets = [task._targets(robot, q) for level in lists for task in level]
     count = q.shape[0]
@@ -196,7 +203,7 @@ class Stepper:
     def __init__(self, robot: Robot, tasks: Levels, dt: float, *, damping: float = 1e-3) -> None:
         self.robot = robot
         self.dt, self._damping = _settings(dt, damping)
-        self._levels = [list(_members(level)) for level in tasks]
+        self._levels = [list(_members(level)) for level in _listed(tasks)]
         structure_of(robot, self._levels)
         self._depends = any(isinstance(t, DescentTask) for level in self._levels for t in level)
         self._program: Program | None = None

@@ -11,9 +11,10 @@ import numpy as np
 
 from ._jit import kernel
 from .chain import load_block
+from .ik_faults import first_fault
 from .ik_priority import prioritised, priority_work, step_bounds
 from .ik_saturate import MET, saturate, saturate_work
-from .ik_tasks import first_fault, task_block
+from .ik_tasks import task_block
 from .lanes import LANES
 from .tree import tree_block
 from .vector import larger, load, magnitude, root, select, smaller, some, splat, store
@@ -22,7 +23,7 @@ L = LANES
 REGULAR = 1e-6  # a row whose part in the free space is shorter than this is left to the pivoting method
 
 
-@kernel
+@kernel(borrow=True)
 def project_rows(J, first, last, N, n, width, A):
     """``A = J N`` for the rows first … last of J, on the first *width* columns of N."""
     for i in range(first, last):
@@ -33,7 +34,7 @@ def project_rows(J, first, last, N, n, width, A):
             store(A, (i * n + c) * L, s)
 
 
-@kernel
+@kernel(borrow=True)
 def normal_equations(A, rest, first, last, n, width, damping, H, z):
     """``H = AᵀA + damping (L)``, ``z = Aᵀ rest``, then z becomes H⁻¹ z by a Cholesky factorisation, all on lanes.
 
@@ -61,7 +62,7 @@ def normal_equations(A, rest, first, last, n, width, damping, H, z):
         store(z, c * L, s * load(H, (c * n + c) * L))
 
 
-@kernel
+@kernel(borrow=True)
 def reflect(u, beta, M, first, last, n, width):
     """Apply the reflection ``1 − β u uᵀ`` to the rows first … last of M, on its first *width* columns."""
     b = load(beta, 0)
@@ -75,7 +76,7 @@ def reflect(u, beta, M, first, last, n, width):
             store(M, o, load(M, o) - dot * load(u, c * L))
 
 
-@kernel
+@kernel(borrow=True)
 def take_rows_out(A, first, last, N, n, width, u, beta, irregular):
     """Reflect N so that the rows of A (in its basis) have no part in the columns that are left; returns how many."""
     for i in range(first, last):

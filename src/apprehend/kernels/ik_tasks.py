@@ -45,9 +45,6 @@ RELATIVE = 6  # data: pose of frame 1 in frame 0
 JOINTS = 7  # goal: values
 DESCENT = 8  # goal: the step itself
 
-ROTATION_TOLERANCE = 1e-6  # as in `arrays`
-OUTSIDE = 1e-9  # a joint may be this far outside its limits
-
 
 class TaskList(NamedTuple):
     """Arrays of a list of tasks; see the head of this module."""
@@ -62,7 +59,7 @@ class TaskList(NamedTuple):
     pick: np.ndarray
 
 
-@kernel
+@kernel(borrow=True)
 def frame_block(tree, poses, frame, X):
     """Pose ``X (12 * L)`` of a frame from the moved frames of the joints ``poses (12 * m * L)``."""
     joint = tree.frame_joint[frame]
@@ -80,7 +77,7 @@ def frame_block(tree, poses, frame, X):
         store(X, (9 + r) * L, p + a0 * place[9] + a1 * place[10] + a2 * place[11])
 
 
-@kernel
+@kernel(borrow=True)
 def moving_block(tree, poses, frame, point, G, n, sign):
     """Add *sign* times the velocity of ``point (3 * L)`` of the world fixed to *frame*, and its angular velocity, to
     ``G (6, n, L)``."""
@@ -144,7 +141,7 @@ def rotation_vectors(A, B, out):
             out[l], out[L + l], out[2 * L + l] = f * x, f * y, f * z
 
 
-@kernel
+@kernel(borrow=True)
 def turned_block(R, G, first, v, J, e, r, n):
     """Rows r … r + 2 of J and e: ``Rᵀ`` times rows first … of G and the vector ``v (3 * L)``."""
     for k in range(3):
@@ -157,7 +154,7 @@ def turned_block(R, G, first, v, J, e, r, n):
             store(J, ((r + k) * n + c) * L, x * a + y * b + z * d)
 
 
-@kernel
+@kernel(borrow=True)
 def tangents(a, d, U, e, r):
     """Two tangents ``U (6 * L)`` at the unit vectors ``a (3 * L)``, and the turn from a to d along them, rows r, r + 1."""
     for l in range(L):
@@ -184,7 +181,7 @@ def tangents(a, d, U, e, r):
             e[(r + 1) * L + l] = 0.0
 
 
-@kernel
+@kernel(borrow=True)
 def tangent_rows(U, G, J, r, n):
     """Rows r, r + 1 of J: the angular velocities in rows 3 … 5 of G along the tangents."""
     for h in range(2):
@@ -194,7 +191,7 @@ def tangent_rows(U, G, J, r, n):
             store(J, ((r + h) * n + c) * L, x * a + y * b + z * d)
 
 
-@kernel
+@kernel(borrow=True)
 def unit_block(v):
     """Scale ``v (3 * L)`` to length one."""
     x, y, z = load(v, 0), load(v, L), load(v, 2 * L)
@@ -204,7 +201,7 @@ def unit_block(v):
     store(v, 2 * L, z * f)
 
 
-@kernel
+@kernel(borrow=True)
 def sight_block(D, point, d, G, n):
     """Unit vectors ``d (3 * L)`` from *point* to D; rows 3 … 5 of G become the velocity relative to that line.
 
@@ -322,7 +319,7 @@ def relative_rows(tree, tasks, t, D, poses, n, X, Y, G, v, J, e):
     turned_block(X, G, 3, v, J, e, r + 3, n)
 
 
-@kernel
+@kernel(borrow=True)
 def load_data(data, t, first, last, D):
     """Targets of task t for the problems from *first* on into ``D (12 * L)``: rotation or vector (9), position (3)."""
     if data.shape[0] == 1:
@@ -373,51 +370,3 @@ def task_block(tree, tasks, data, goal, q, first, last, poses, J, e):
             if w != 1.0:
                 for k in range(i * n, (i + 1) * n):
                     store(J, k * L, load(J, k * L) * w)
-
-
-@kernel(fast=False)  # a sum minus itself must stay what it is where it is not finite
-def bad_target(kind, pick, data, goal):
-    """Whether a target ``data (16)``, ``goal (n)`` is no finite pose, direction, or point."""
-    total = 0.0
-    if kind >= JOINTS:
-        for c in pick:
-            total += goal[c]
-        return not math.isfinite(total)
-    for i in range(16):
-        total += data[i]
-    if not math.isfinite(total):
-        return True
-    if kind == DIRECTION:
-        return data[0] * data[0] + data[1] * data[1] + data[2] * data[2] < 1e-24
-    if kind in (LOOK_AT, COM):
-        return False
-    if data[12] != 0.0 or data[13] != 0.0 or data[14] != 0.0 or data[15] != 1.0:
-        return True
-    for a in range(3):
-        for b in range(a + 1):
-            dot = data[a] * data[b] + data[4 + a] * data[4 + b] + data[8 + a] * data[8 + b]
-            if abs(dot - (1.0 if a == b else 0.0)) > ROTATION_TOLERANCE:
-                return True
-    x = data[5] * data[10] - data[6] * data[9]
-    y = data[6] * data[8] - data[4] * data[10]
-    z = data[4] * data[9] - data[5] * data[8]
-    return data[0] * x + data[1] * y + data[2] * z < 0.0
-
-
-@kernel(fast=False)
-def first_fault(tasks, data, goal, q, lower, upper, first, last):
-    """What is wrong in the rows first … last: 0 nothing, −1 a joint value that is not finite or outside its limits,
-    t + 1 the target of task t."""
-    for i in range(first, last):
-        for k in range(q.shape[1]):
-            v = q[i, k]
-            if not (v >= lower[k] - OUTSIDE and v <= upper[k] + OUTSIDE and math.isfinite(v)):
-                return -1
-    for t in range(tasks.kind.shape[0]):
-        pick = tasks.pick[tasks.row[t] : tasks.row[t + 1]]
-        for i in range(first, last):
-            if i > 0 and data.shape[0] == 1:
-                break
-            if bad_target(tasks.kind[t], pick, data[i, t], goal[i, t]):
-                return t + 1
-    return 0
