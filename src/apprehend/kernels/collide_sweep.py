@@ -8,7 +8,7 @@ from ._jit import kernel
 from .collide import block_rates, make_space, node_gap, pair_gap, place
 
 
-@kernel
+@kernel(borrow=True)
 def ahead(model, space, rate, margin, tolerance, wanted):
     """Part of a motion from the placed configuration on that is certainly free, at most *wanted*; and what ends it.
 

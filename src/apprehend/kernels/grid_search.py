@@ -32,7 +32,7 @@ FAR = 0.02
 ROOT3 = 1.7320508075688772
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def grid_value(grids, start, x, y, z, out):
     """The field at (x, y, z), counted in cells from node 0; its slope per cell into ``out (3,)``."""
     nx, ny, nz = int(grids[start + 1]), int(grids[start + 2]), int(grids[start + 3])
@@ -61,7 +61,7 @@ def grid_value(grids, start, x, y, z, out):
     return far
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def field_at(grids, start, x, y, z):
     """A lower bound on the field at a point of its frame: from the nearest node and the Lipschitz constant."""
     h = grids[start]
@@ -76,7 +76,7 @@ def field_at(grids, start, x, y, z):
     return max(value - grids[start + 4] * away, h * math.sqrt(x * x + y * y + z * z) if x + y + z > 0.0 else -1e300)
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def plane_under(grids, start, x, y, z, half, plane, scratch):
     """A plane ``plane[0:3] · (p − (x, y, z)) + plane[3]`` that lies under the field on a box; ``plane[4]``: its least value.
 
@@ -113,7 +113,7 @@ def plane_under(grids, start, x, y, z, half, plane, scratch):
     plane[0], plane[1], plane[2], plane[3], plane[4] = g0, g1, g2, under, least
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def try_point(grids, start, ws, px, py, pz, best, scratch):
     """Evaluate the field at a point of the shape, given in its frame; the better of it and *best* is kept in ``ws``."""
     keep = ws[KEEP]
@@ -134,7 +134,7 @@ def try_point(grids, start, ws, px, py, pz, best, scratch):
     return f
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def root_box(ints, floats, points, graph, grids, start, a, ws, box, stack):
     """Bounds ``box (6,)`` of the core of *a* along the axes of the grid, in cells; the first box of the search."""
     keep, h = ws[KEEP], grids[start]
@@ -156,7 +156,7 @@ def root_box(ints, floats, points, graph, grids, start, a, ws, box, stack):
         stack[0, 1 + c] = math.floor(box[c]) + half
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def in_grid(grids, start, x, y, z, half):
     """Whether a box lies wholly between the first and the last nodes."""
     if x < half or y < half or z < half:
@@ -166,7 +166,7 @@ def in_grid(grids, start, x, y, z, half):
     )
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def plane_bound(ints, floats, points, graph, a, h, half, lower, upper, ws):
     """The least value on a box and the core of *a* of the plane under the field in that box.
 
@@ -200,7 +200,7 @@ def plane_bound(ints, floats, points, graph, a, h, half, lower, upper, ws):
     return bound
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def field_gap(ints, floats, points, graph, grids, a, b, ws, above, below, tolerance, stack):
     """Bounds on the least value of field *b* on shape *a*; ``ws[REL]`` holds the pose of b in a.
 
@@ -268,7 +268,7 @@ def field_gap(ints, floats, points, graph, grids, a, b, ws, above, below, tolera
     return min(low, best) - grown, best - grown
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def to_shape(keep, grids, start, u, v, w, out):
     """A place in cells as a point in the frame of the shape."""
     h = grids[start]
@@ -279,7 +279,7 @@ def to_shape(keep, grids, start, u, v, w, out):
         out[i] = keep[3 * i] * x + keep[3 * i + 1] * y + keep[3 * i + 2] * z + keep[9 + i]
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def split_box(grids, start, stack, top, bound, x, y, z, half, scratch):
     """Push the eight parts of a box, the lowest last; returns the new top."""
     first = top
@@ -298,7 +298,7 @@ def split_box(grids, start, stack, top, bound, x, y, z, half, scratch):
     return top
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def keep_witness(ws, best, grown):
     """Move the best point found into ``ws[NEAR]`` and ``ws[AXIS]`` and restore ``ws[REL]``."""
     row = ws[BEST]

@@ -30,7 +30,7 @@ def obstacle_stack():
     return np.empty((STACK, 6))
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def half_space_distance(ints, floats, points, graph, a, b, ws):
     """Signed distance of *a* to half-space *b*, the pose of which in a is ``ws[REL]``; witnesses as `signed_distance`."""
     rel, near = ws[REL], ws[NEAR]
@@ -44,7 +44,7 @@ def half_space_distance(ints, floats, points, graph, a, b, ws):
     return d - ra - rb
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def box_gap(floats, a, x, y, z):
     """A lower bound on the signed distance between a point in the frame of *a* and the shape."""
     dx, dy, dz = abs(x) - floats[a, 20], abs(y) - floats[a, 21], abs(z) - floats[a, 22]
@@ -52,7 +52,7 @@ def box_gap(floats, a, x, y, z):
     return math.sqrt(px * px + py * py + pz * pz) + min(max(max(dx, dy), dz), 0.0)
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def tree_gap(ints, floats, points, graph, trees, a, b, ws, big, above, below, gap, exact, stack):
     """Bounds on the distance of *a* to cloud or tree *b*, the pose of which in a is ``ws[REL]``.
 
@@ -127,7 +127,7 @@ def tree_gap(ints, floats, points, graph, trees, a, b, ws, big, above, below, ga
     return lower, upper
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def push_ball(trees, row, level, i, floats, a, keep, radius, stack, top):
     """Push node *i* of a level with a lower bound on its distance to shape *a*; returns the new top."""
     x, y, z = trees[row + i, 0], trees[row + i, 1], trees[row + i, 2]
@@ -139,7 +139,7 @@ def push_ball(trees, row, level, i, floats, a, keep, radius, stack, top):
     return top + 1
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def obstacle_gap(ints, floats, points, graph, trees, grids, a, b, ws, big, above, below, gap, stack):
     """Bounds on the distance of *a* to *b*, which is a half-space, a cloud or a field; see `gjk` for the rest."""
     kind = ints[b, 0]
@@ -154,7 +154,7 @@ def obstacle_gap(ints, floats, points, graph, trees, grids, a, b, ws, big, above
     return field_gap(ints, floats, points, graph, grids, a, b, ws, above, below, slack, stack)
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def any_distance(ints, floats, points, graph, trees, grids, a, b, ws, big, above, stack):
     """As `signed_distance`, where *b* may be of any kind; where it is above *above*, something above is answered."""
     kind = ints[b, 0]
@@ -170,7 +170,7 @@ def any_distance(ints, floats, points, graph, trees, grids, a, b, ws, big, above
     return field_gap(ints, floats, points, graph, grids, a, b, ws, above, -1e300, slack, stack)[1]
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def sort_tree(points, radii, levels, order, trees, first):
     """Sort ``points (N, 3)`` (through *order*) into a balanced tree of *levels* and fill its balls from row *first*."""
     count = points.shape[0]
@@ -198,7 +198,7 @@ def sort_tree(points, radii, levels, order, trees, first):
                 select(points, order, begin, end, (count * (2 * i + 1)) >> (level + 1), axis)
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def select(points, order, begin, end, middle, axis):
     """Partition ``order[begin:end]`` so that what precedes *middle* is not greater along *axis* (Hoare's FIND)."""
     low, high = begin, end - 1
