@@ -38,7 +38,7 @@ ACCEPTABLE = 1e-6
 EXTRAS = 7
 """Entries of an answer after x, y and z: status, primal and dual value, primal and dual residual, steps, size."""
 
-X, Z, C, SQUARE, RD, RH, CH, QH, U, V, U0, D, E, VECTORS = 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16
+X, Z, C, SQUARE, RD, RH, CH, QH, U, V, U0, D, E, VECTORS = 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20
 """Vectors of columns, behind those of the scaling: x, z, c, Q, the dual residual, that, c and 2 Q x / τ scaled, scaled
 directions, and room for what becomes Δx and Δz."""
 B, RP, Y, Y0, DY, UNIT, SHORTS = 0, 1, 2, 3, 4, 5, 6
@@ -72,8 +72,9 @@ def _fetch(lane, columns, right, wrench, cones, slack, floor, begin, warm, A, V_
         unit = max(1.0, abs(t)) if slack[r] >= 0 else 1.0
         R[B, r, lane], R[UNIT, r, lane] = t / unit, unit
         largest = max(largest, abs(t / unit))
+        share = 1.0 / unit
         for j in range(n):
-            A[j, r, lane] = columns[j, r] / unit
+            A[j, r, lane] = columns[j, r] * share
         if slack[r] >= 0:
             A[slack[r], r, lane] = columns[slack[r], r]
     K[NORM_B, lane], largest = largest, 0.0

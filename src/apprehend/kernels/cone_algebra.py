@@ -12,8 +12,9 @@ from ._jit import kernel
 from .cone_rows import backward, factor, forward
 from .wide import larger, load2, root, store2, wide
 
-SCALING, BETA, LAMBDA = 0, 1, 2
-"""Vectors that hold the scaling: unit vectors w, factors β (at the first entry of each cone), and λ."""
+SCALING, LAMBDA, BETA, BACK, SHARE, DEPTH, TILT = 0, 1, 2, 3, 4, 5, 6
+"""Vectors that hold the scaling: unit vectors w and λ; then numbers at the first entry of each cone: β, 1 / β,
+1 / (1 + w₀), the inverse of λ's depth √(λ₀² − ‖λ₁…‖²), and 1 / (λ₀ + depth)."""
 
 
 @kernel
@@ -34,7 +35,7 @@ def scaling(V, cones, x, z):  # type: ignore[no-untyped-def]
         ix, iz = 1.0 / xn, 1.0 / zn
         b = root(xn * iz)
         h = 0.5 / root(0.5 + 0.5 * xz * ix * iz)
-        ix, iz = ix * h, iz * h
+        jx, ix, iz = ix, ix * h, iz * h
         w0, dot = x0 * ix + z0 * iz, wide(0.0)
         for j in range(s + 1, end, 2):
             z1, z2 = load2(V, z, j), load2(V, z, j + 1)
@@ -43,9 +44,14 @@ def scaling(V, cones, x, z):  # type: ignore[no-untyped-def]
             store2(V, SCALING, j, w1)
             store2(V, SCALING, j + 1, w2)
         store2(V, SCALING, s, w0)
+        share, l0 = 1.0 / (1.0 + w0), b * (w0 * z0 + dot)
+        t = dot * share + z0
+        store2(V, LAMBDA, s, l0)
         store2(V, BETA, s, b)
-        store2(V, LAMBDA, s, b * (w0 * z0 + dot))
-        t = dot / (1.0 + w0) + z0
+        store2(V, BACK, s, b * zn * jx)
+        store2(V, SHARE, s, share)
+        store2(V, DEPTH, s, b * jx)
+        store2(V, TILT, s, 1.0 / (l0 + b * zn))
         for j in range(s + 1, end, 2):
             store2(V, LAMBDA, j, b * (load2(V, z, j) + t * load2(V, SCALING, j)))
             store2(V, LAMBDA, j + 1, b * (load2(V, z, j + 1) + t * load2(V, SCALING, j + 1)))
@@ -58,12 +64,10 @@ def apply(V, cones, sign, v, out):  # type: ignore[no-untyped-def]
     s = 0
     for i in range(cones.shape[0]):
         end = s + cones[i]
-        b, w0, v0, dot = load2(V, BETA, s), load2(V, SCALING, s), load2(V, v, s), wide(0.0)
-        if sign < 0.0:
-            b = 1.0 / b
+        b, w0, v0, dot = load2(V, BETA if sign > 0.0 else BACK, s), load2(V, SCALING, s), load2(V, v, s), wide(0.0)
         for j in range(s + 1, end, 2):
             dot += load2(V, SCALING, j) * load2(V, v, j) + load2(V, SCALING, j + 1) * load2(V, v, j + 1)
-        t = dot / (1.0 + w0) + sign * v0
+        t = dot * load2(V, SHARE, s) + sign * v0
         store2(V, out, s, b * (w0 * v0 + sign * dot))
         for j in range(s + 1, end, 2):
             store2(V, out, j, b * (load2(V, v, j) + t * load2(V, SCALING, j)))
@@ -77,8 +81,18 @@ def apply_rows(V, cones, A, out):  # type: ignore[no-untyped-def]
     s = 0
     for i in range(cones.shape[0]):
         end = s + cones[i]
-        b, w0 = load2(V, BETA, s), load2(V, SCALING, s)
-        share = 1.0 / (1.0 + w0)
+        b, w0, share = load2(V, BETA, s), load2(V, SCALING, s), load2(V, SHARE, s)
+        if end == s + 3:  # Coulomb's cone, with w in registers
+            w1, w2 = load2(V, SCALING, s + 1), load2(V, SCALING, s + 2)
+            for r in range(A.shape[1]):
+                v0, v1, v2 = b * load2(A, s, r), b * load2(A, s + 1, r), b * load2(A, s + 2, r)
+                dot = w1 * v1 + w2 * v2
+                t = dot * share + v0
+                store2(out, s, r, w0 * v0 + dot)
+                store2(out, s + 1, r, v1 + t * w1)
+                store2(out, s + 2, r, v2 + t * w2)
+            s = end
+            continue
         for r in range(A.shape[1]):
             v0, dot = load2(A, s, r), wide(0.0)
             for j in range(s + 1, end, 2):
@@ -98,18 +112,15 @@ def quotient(V, cones, a, b, minus, out):  # type: ignore[no-untyped-def]
     for i in range(cones.shape[0]):
         end = s + cones[i]
         a0, b0, l0 = load2(V, a, s), load2(V, b, s), load2(V, LAMBDA, s)
-        d0, square, dot = a0 * b0 - minus, wide(0.0), wide(0.0)
+        d0, dot, depth = a0 * b0 - minus, wide(0.0), load2(V, DEPTH, s)
         for j in range(s + 1, end, 2):
             a1, a2, b1, b2, l1, l2 = load2(V, a, j), load2(V, a, j + 1), load2(V, b, j), load2(V, b, j + 1), load2(V, LAMBDA, j), load2(V, LAMBDA, j + 1)  # fmt: skip
             d1, d2 = a0 * b1 + b0 * a1, a0 * b2 + b0 * a2
             d0 += a1 * b1 + a2 * b2
-            square += l1 * l1 + l2 * l2
             dot += l1 * d1 + l2 * d2
             store2(V, out, j, d1)
             store2(V, out, j + 1, d2)
-        norm = root(square)
-        u0 = (l0 * d0 - dot) / larger((l0 - norm) * (l0 + norm), 1e-300)
-        inverse = 1.0 / l0
+        u0, inverse = (l0 * d0 - dot) * depth * depth, 1.0 / l0
         store2(V, out, s, u0)
         for j in range(s + 1, end):
             store2(V, out, j, (load2(V, out, j) - u0 * load2(V, LAMBDA, j)) * inverse)
@@ -123,17 +134,14 @@ def room(V, cones, d, e):  # type: ignore[no-untyped-def]
     for i in range(cones.shape[0]):
         end = s + cones[i]
         x0, d0, e0 = load2(V, LAMBDA, s), load2(V, d, s), load2(V, e, s)
-        square, xd, xe = wide(0.0), wide(0.0), wide(0.0)
+        inverse, tilt = load2(V, DEPTH, s), load2(V, TILT, s)
+        xd, xe = wide(0.0), wide(0.0)
         for j in range(s + 1, end):
             x1 = load2(V, LAMBDA, j)
-            square += x1 * x1
             xd += x1 * load2(V, d, j)
             xe += x1 * load2(V, e, j)
-        norm = root(square)
-        depth = root(larger((x0 - norm) * (x0 + norm), 1e-300))
-        inverse, share = 1.0 / depth, 1.0 / (x0 + depth)
         d1, e1 = (x0 * d0 - xd) * inverse, (x0 * e0 - xe) * inverse
-        t, u = (d1 + d0) * share, (e1 + e0) * share
+        t, u = (d1 + d0) * tilt, (e1 + e0) * tilt
         dd, ee = wide(0.0), wide(0.0)
         for j in range(s + 1, end):
             x1 = load2(V, LAMBDA, j)
