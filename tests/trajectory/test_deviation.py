@@ -70,12 +70,12 @@ def test_the_tool_stays_in_the_certified_tube(robot: str, kind: str, deviation: 
     assert ((answer.points >= low) & (answer.points <= high)).all()
 
 
-@pytest.mark.parametrize("deviation", [1e-3, 5e-3])
-def test_as_few_points_as_an_exhaustive_search(panda: ap.Robot, deviation: float) -> None:
+@pytest.mark.parametrize("kind, deviation", [("line", 1e-3), ("line", 5e-3), ("arc", 1e-3), ("screw", 1e-3)])
+def test_as_few_points_as_an_exhaustive_search(panda: ap.Robot, kind: str, deviation: float) -> None:
     from apprehend.kernels import path_line as kernels
     from apprehend.trajectory.deviation import LEAP, NODES, TOLERANCE
 
-    answer = LINES["line"](panda, deviation=deviation, rotation=0.05).require_success()
+    answer = LINES[kind](panda, deviation=deviation, rotation=0.05).require_success()
     model, helix = panda.chain_model(answer.frame), answer.line.packed
     low, high = np.ascontiguousarray(panda.limits.lower), np.ascontiguousarray(panda.limits.upper)
     nodes = np.linspace(0.0, 1.0, NODES + 1)
@@ -86,15 +86,15 @@ def test_as_few_points_as_an_exhaustive_search(panda: ap.Robot, deviation: float
     T, J, w = np.empty((4, 4)), np.empty((6, panda.n)), np.empty(64)
     for s, row in zip(grid, points, strict=True):
         kernels.curve(model, helix, 6, nodes, q, dq, low, high, TOLERANCE, s, row, T, J, w)
+    near = cKDTree(answer.line(np.linspace(0.0, 1.0, 40001))[:, :3, 3])
     # fewest segments by dynamic programming over all pairs of grid points, the tube measured by samples
     fewest = np.full(grid.size, 10**6)
     fewest[0] = 0
     z = np.linspace(0.0, 1.0, 22)[1:-1, None]
     for b in range(1, grid.size):
-        first = max(0, b - 60)
+        first = max(0, b - 80)
         joint = points[first:b, None] * (1 - z) + points[b] * z
-        X = panda.fk(joint, answer.frame)[..., :3, 3]
-        away = np.hypot(X[..., 0] - 0.4, X[..., 2] - 0.3).max(axis=1)
+        away = near.query(panda.fk(joint, answer.frame)[..., :3, 3])[0].max(axis=1)
         allowed = np.flatnonzero(away <= deviation) + first
         if allowed.size:
             fewest[b] = fewest[allowed].min() + 1

@@ -49,7 +49,7 @@ def sampled_rows(values, bounds, step, r, size, work, out):
                 second = highest * inverse
                 low = min(first, second)
                 high = max(first, second)
-                broken = none and (lowest > 0.0 or highest < 0.0)
+                broken = lowest > highest or (none and (lowest > 0.0 or highest < 0.0))
                 out[to + lane] = -a * inverse if plain else 0.0
                 out[to + WIDE + lane] = low if plain else -np.inf
                 out[to + 2 * WIDE + lane] = high if plain else np.inf

@@ -63,8 +63,16 @@ def plot_pareto(front: Sequence[Compromise]) -> Any:
     axis = figure.subplots()
     factors = np.array([c.factors for c in front])
     drawn = axis.scatter(factors[:, 0], factors[:, 1], c=factors[:, 2], cmap="viridis", s=50)
-    for c, (x, y, _) in zip(front, factors):
-        axis.annotate(f"{c.time:.2f} s", (x, y), fontsize="x-small", xytext=(4, 4), textcoords="offset points")
+    # the best in each factor is named; what is far apart is drawn to a logarithmic scale
+    for k, name in enumerate(("shortest", "smoothest", "fastest")):
+        best = int(factors[:, k].argmin())
+        axis.annotate(
+            f"{name}: {factors[best, 2]:.2f} s", factors[best, :2], fontsize="small", textcoords="offset points",
+            xytext=(6, (6, -12, 18)[k]), ha="left" if factors[best, 0] < factors[:, 0].mean() else "right",
+        )  # fmt: skip
+    for values, scale in ((factors[:, 0], axis.set_xscale), (factors[:, 1], axis.set_yscale)):
+        if values.min() > 0.0 and values.max() > 10.0 * values.min():
+            scale("log")
     figure.colorbar(drawn, label="motion time (s)")
     axis.set_xlabel("arc length")
     axis.set_ylabel("bending energy")

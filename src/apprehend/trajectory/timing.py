@@ -190,7 +190,8 @@ def _constrained(problem: _Problem, constraints: Sequence[Constraint], adaptive:
         if timing.success and found.power.any():
             timing, shares = _within_power(problem, found, timing)
         parts = np.where(shares > WIDEST_MARGIN, np.ceil(np.minimum(5.0 * shares / WIDEST_MARGIN, 1e4) ** 0.2), 1.0)
-        if timing.status is TimingStatus.INFEASIBLE and problem.grid.size <= SMALL_GRID:
+        possible = timing.success or timing.status is TimingStatus.COARSE
+        if not possible and problem.grid.size <= SMALL_GRID:
             parts = np.maximum(parts, 2.0)  # what a coarse grid cannot do, a finer one may
         if not adaptive or last == 0 or parts.max() == 1.0:
             break
