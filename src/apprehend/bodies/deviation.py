@@ -26,6 +26,8 @@ class Deviation:
     """What is lost between a body and a model of it; lengths in m, volumes in m³. Bounds hold, they are not estimates.
 
     ``outward`` and ``inward`` are the two one-sided Hausdorff distances; their maximum is the Hausdorff distance.
+    Solid models are compared with the solid body, its holes closed by fans (`MeshIndex.fans`); surfaces and lines with
+    the surface.
     """
 
     outward: float
@@ -37,7 +39,7 @@ class Deviation:
     volume: float
     """Volume of the model; 0 for lines and open surfaces."""
     body_volume: float
-    """Volume of what the surface of the body encloses; 0 if the surface has holes."""
+    """Volume of what the surface of the body encloses, holes closed by fans."""
 
     @property
     def hausdorff(self) -> float:

@@ -52,8 +52,8 @@ class MeshIndex:
         return np.asarray(kernels.frames(self.tree.triangles))
 
     @cached_property
-    def caps(self) -> tuple[rays.Tree, Array] | None:
-        """The fans over the rims of holes: their tree and its dipoles; None for a closed mesh."""
+    def fans(self) -> tuple[Array, IntArray] | None:
+        """Triangles that close the holes: all vertices and the middles of the rims, and the faces; None if closed."""
         if topology.is_closed(self.faces):
             return None
         points, triangles = [self.vertices], []
@@ -63,15 +63,27 @@ class MeshIndex:
             around = np.asarray(loop, dtype=np.int64)
             triangles.append(np.column_stack([np.full(len(loop), count), around, np.roll(around, -1)]))
             count += 1
-        if not triangles:
+        return (np.concatenate(points), np.concatenate(triangles)) if triangles else None
+
+    @cached_property
+    def caps(self) -> tuple[rays.Tree, Array] | None:
+        """The `fans` as a tree with its dipoles; None for a closed mesh."""
+        if self.fans is None:
             return None
-        tree = rays.Tree(*rays.build(np.concatenate(points), np.concatenate(triangles)))
+        tree = rays.Tree(*rays.build(*self.fans))
         return tree, winding.dipoles(tree)
+
+    @cached_property
+    def capped(self) -> MeshIndex:
+        """The same surface with its holes closed by `fans`; itself where it is closed."""
+        if self.fans is None:
+            return self
+        return MeshIndex(self.fans[0], np.concatenate([self.faces, self.fans[1]]))
 
     @property
     def closed(self) -> bool:
         """Whether the mesh has no rim: every edge of a face is matched by one in the opposite direction."""
-        return self.caps is None
+        return self.fans is None
 
     def nearest(self, points: ArrayLike) -> Nearest:
         """The nearest point of the surface to each of *points* ``(..., 3)``, its distance and its face."""

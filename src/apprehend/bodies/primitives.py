@@ -120,9 +120,10 @@ class Primitives(ABC):
 
     def deviation(self, body: MeshIndex) -> Deviation:
         """How much the model differs from *body* (see `Deviation`)."""
-        grown = self.bounds + 0.02 * np.ptp(self.bounds) * np.array([[-1.0], [1.0]])
-        outward = farthest_of_solid(self._distance, grown[0], grown[1], body.signed_distance)[1]
-        volume = mass.solid(body.vertices, body.faces).volume if body.closed else 0.0
+        low, high = self.bounds
+        pad = 0.02 * float((high - low).max())
+        outward = farthest_of_solid(self._distance, low - pad, high + pad, body.capped.signed_distance)[1]
+        volume = mass.solid(body.capped.vertices, body.capped.faces).volume
         return Deviation(outward, self._missed(body), self.ENCLOSES, self.volume, max(volume, 0.0))
 
     def _missed(self, body: MeshIndex) -> float:

@@ -53,7 +53,7 @@ class SurfaceMesh:
         """How much this surface differs from that of *body*: largest distances from one to the other, both ways."""
         outward = farthest_from_mesh(self.vertices[self.faces], body)
         inward = farthest_from_mesh(body.vertices[body.faces], self.index)
-        volume = solid(body.vertices, body.faces).volume if body.closed else 0.0
+        volume = max(solid(body.capped.vertices, body.capped.faces).volume, 0.0)
         return Deviation(outward, inward, False, self.volume, volume)
 
     def save(self, path: str | Path) -> Path:

@@ -119,7 +119,7 @@ class Voxels:
         inward = 0.0
         if not encloses:
             inward = farthest_outside(body.vertices[body.faces], self.surface.index)
-        volume = solid(body.vertices, body.faces).volume if body.closed else 0.0
+        volume = max(solid(body.capped.vertices, body.capped.faces).volume, 0.0)
         return Deviation(outward * (1.0 + 1e-6), inward, encloses, self.volume, volume)
 
     def save(self, path: str | Path) -> Path:
