@@ -1,5 +1,7 @@
 """Closed forms: all branches of UR5- and Puma-like arms, beside EAIK on the same poses in the same run.
 
+And of an arm whose six axes lie anywhere, which subproblems do not decompose (on a fiftieth of the poses).
+
 python -m benchmarks.ik_branches [--poses 100000]
 """
 
@@ -37,6 +39,21 @@ def puma() -> Robot:
     joints.append(Joint("tool", JointType.FIXED, names[-1], "tool0", T))
     names.append("tool0")
     return Robot(Description("puma560", "base", {n: Link(n) for n in names}, tuple(joints)))
+
+
+def anywhere() -> Robot:
+    """Six revolute joints with random axes."""
+    rng = np.random.default_rng(1)
+    links = ["base", *(f"link{i}" for i in range(6))]
+    joints = []
+    for i in range(6):
+        T = np.eye(4)
+        T[:3, 3] = rng.normal(size=3) * 0.25
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        limits = JointLimits(-np.pi, np.pi)
+        joints.append(Joint(f"j{i}", JointType.REVOLUTE, links[i], links[i + 1], T, axis, limits))
+    return Robot(Description("anywhere", "base", {n: Link(n) for n in links}, tuple(joints)))
 
 
 def report(name: str, robot: Robot, frame: str, count: int) -> None:
@@ -81,6 +98,7 @@ def main() -> None:
     ur5 = arm("ur5")
     report("UR5", ur5.robot, ur5.tip, count)
     report("Puma 560", puma(), "tool0", count)
+    report("axes anywhere", anywhere(), "link5", max(count // 50, 100))
 
 
 if __name__ == "__main__":

@@ -95,7 +95,18 @@ def main() -> None:
     one, tasks = problem(robot, tip, 1, 0.005, 2)
     alone = ik.Stepper(robot, tasks, DT)
     contenders["alone, prepared (Stepper)"] = (lambda: [alone(one[0]) for _ in range(200)], 200)
-    contenders["alone, tasks read anew (step)"] = (lambda: [ik.step(robot, one[0], tasks, DT) for _ in range(200)], 200)
+
+    def anew() -> None:
+        for _ in range(200):
+            made = [
+                ik.PositionTask(tip, place),
+                ik.DirectionTask(tip, way),
+                ik.PostureTask(robot.home, gain=0.01),
+            ]
+            ik.step(robot, one[0], made, DT)
+
+    place, way = tasks[0].position[0].copy(), tasks[1].direction[0].copy()
+    contenders["alone, tasks made anew (step)"] = (anew, 200)
     table(
         f"{robot.n} joints, position, direction and posture, per step",
         interleave(contenders, 5),
