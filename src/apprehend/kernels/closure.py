@@ -235,6 +235,8 @@ def prove(base, spread, flags, margin, steps, verdict, slack_out, force, wrench)
     of the half-axes), normal forces summing to one; *wrench* ``(N, d)``: unit direction along which none can push.
     """
     N, k, d = base.shape
+    if N == 0:
+        return
     B, boxed = np.zeros((k, 4, d, LANES)), np.zeros((k, LANES))
     Y, dY, grad = np.zeros((d, LANES)), np.zeros((d, LANES)), np.zeros((d, LANES))
     H, C, P, F = np.zeros((d, d, LANES)), np.zeros((k, 13, LANES)), np.zeros((k, d, LANES)), np.zeros((k, 4, LANES))
