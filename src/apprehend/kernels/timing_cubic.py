@@ -34,6 +34,25 @@ def _hull(c1, c2, c3, z, h):
     return v0, v1, v0 + w0 * h + 0.5 * bend * h, w0, w0 + bend
 
 
+@kernel(inline=True)
+def _join_velocity(v0, v1, v2, fast, back, lane, work):
+    """The square of q' as a share of its limit joins the worst of the other joints."""
+    top = max(v0, max(v1, v2))
+    low = min(v0, min(v1, v2))
+    weight = max(fast if top > 0.0 else 0.0, back if low < 0.0 else 0.0)
+    work[lane] = max(work[lane], v0 * v0 * weight)
+    work[WIDE + lane] = max(work[WIDE + lane], v0 * v1 * weight)
+    work[2 * WIDE + lane] = max(work[2 * WIDE + lane], (v0 * v2 + 2.0 * v1 * v1) * weight * 0.3333333333333333)
+    work[3 * WIDE + lane] = max(work[3 * WIDE + lane], v1 * v2 * weight)
+    work[4 * WIDE + lane] = max(work[4 * WIDE + lane], v2 * v2 * weight)
+
+
+@kernel(inline=True)
+def _pairs(v0, v1, v2, w0, w1, half):
+    """a and b of the three rows: see the head of this module."""
+    return w0 - v0 * half, v0 * half, 0.5 * w1 - v1 * half, 0.5 * w0 + v1 * half, -v2 * half, w1 + v2 * half
+
+
 @kernel
 def _joint_rows(j, n, c, place, fast, back, lowest, highest, work, out):
     """Three acceleration rows of joint j into *out*; its velocity² joins the worst in *work*, the bounds on x alone (of
@@ -47,21 +66,9 @@ def _joint_rows(j, n, c, place, fast, back, lowest, highest, work, out):
     base = 9 * j * WIDE & MASK
     for lane in range(WIDE):
         v0, v1, v2, w0, w1 = _hull(c[at1 + lane], c[at2 + lane], c[at3 + lane], place[lane], place[WIDE + lane])
-        top = max(v0, max(v1, v2))
-        low = min(v0, min(v1, v2))
-        weight = max(fast if top > 0.0 else 0.0, back if low < 0.0 else 0.0)
-        work[lane] = max(work[lane], v0 * v0 * weight)
-        work[WIDE + lane] = max(work[WIDE + lane], v0 * v1 * weight)
-        work[2 * WIDE + lane] = max(work[2 * WIDE + lane], (v0 * v2 + 2.0 * v1 * v1) * weight * 0.3333333333333333)
-        work[3 * WIDE + lane] = max(work[3 * WIDE + lane], v1 * v2 * weight)
-        work[4 * WIDE + lane] = max(work[4 * WIDE + lane], v2 * v2 * weight)
+        _join_velocity(v0, v1, v2, fast, back, lane, work)
         half = place[2 * WIDE + lane]
-        b0 = v0 * half
-        a0 = w0 - b0
-        b1 = 0.5 * w0 + v1 * half
-        a1 = 0.5 * w1 - v1 * half
-        a2 = -v2 * half
-        b2 = w1 - a2
+        a0, b0, a1, b1, a2, b2 = _pairs(v0, v1, v2, w0, w1, half)
         plain0 = abs(b0) > 1e-13 * abs(a0)
         plain1 = abs(b1) > 1e-13 * abs(a1)
         plain2 = abs(b2) > 1e-13 * abs(a2)
@@ -132,22 +139,10 @@ def _reach_joint(j, n, c, place, fast, back, lowest, highest, work, xy):
     at3 = (2 * n + j) * WIDE & MASK
     for lane in range(WIDE):
         v0, v1, v2, w0, w1 = _hull(c[at1 + lane], c[at2 + lane], c[at3 + lane], place[lane], place[WIDE + lane])
-        top = max(v0, max(v1, v2))
-        low = min(v0, min(v1, v2))
-        weight = max(fast if top > 0.0 else 0.0, back if low < 0.0 else 0.0)
-        work[lane] = max(work[lane], v0 * v0 * weight)
-        work[WIDE + lane] = max(work[WIDE + lane], v0 * v1 * weight)
-        work[2 * WIDE + lane] = max(work[2 * WIDE + lane], (v0 * v2 + 2.0 * v1 * v1) * weight * 0.3333333333333333)
-        work[3 * WIDE + lane] = max(work[3 * WIDE + lane], v1 * v2 * weight)
-        work[4 * WIDE + lane] = max(work[4 * WIDE + lane], v2 * v2 * weight)
+        _join_velocity(v0, v1, v2, fast, back, lane, work)
         half = place[2 * WIDE + lane]
         x = xy[lane]
-        b0 = v0 * half
-        a0 = w0 - b0
-        b1 = 0.5 * w0 + v1 * half
-        a1 = 0.5 * w1 - v1 * half
-        a2 = -v2 * half
-        b2 = w1 - a2
+        a0, b0, a1, b1, a2, b2 = _pairs(v0, v1, v2, w0, w1, half)
         plain0 = abs(b0) > 1e-13 * abs(a0)
         plain1 = abs(b1) > 1e-13 * abs(a1)
         plain2 = abs(b2) > 1e-13 * abs(a2)

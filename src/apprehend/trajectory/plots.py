@@ -64,11 +64,14 @@ def plot_pareto(front: Sequence[Compromise]) -> Any:
     factors = np.array([c.factors for c in front])
     drawn = axis.scatter(factors[:, 0], factors[:, 1], c=factors[:, 2], cmap="viridis", s=50)
     # the best in each factor is named; what is far apart is drawn to a logarithmic scale
+    best: dict[int, list[str]] = {}
     for k, name in enumerate(("shortest", "smoothest", "fastest")):
-        best = int(factors[:, k].argmin())
+        best.setdefault(int(factors[:, k].argmin()), []).append(name)
+    for i, names in best.items():
+        left = factors[i, 0] < factors[:, 0].mean()
         axis.annotate(
-            f"{name}: {factors[best, 2]:.2f} s", factors[best, :2], fontsize="small", textcoords="offset points",
-            xytext=(6, (6, -12, 18)[k]), ha="left" if factors[best, 0] < factors[:, 0].mean() else "right",
+            f"{', '.join(names)}: {factors[i, 2]:.2f} s", factors[i, :2], fontsize="small",
+            textcoords="offset points", xytext=(8 if left else -8, -3), ha="left" if left else "right",
         )  # fmt: skip
     for values, scale in ((factors[:, 0], axis.set_xscale), (factors[:, 1], axis.set_yscale)):
         if values.min() > 0.0 and values.max() > 10.0 * values.min():
