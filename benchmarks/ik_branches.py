@@ -85,6 +85,7 @@ def report(name: str, robot: Robot, frame: str, count: int) -> None:
         P = np.vstack([g.o[:1], np.diff(g.o, axis=0)])
         peer = EAIK.Robot(g.h.T, P.T, g.R0, [], True)
         few = T[:5000]
+        peer.calculate_IK(few[0])
         contenders["EAIK, one by one from Python"] = (lambda: [peer.calculate_IK(X) for X in few], len(few))
     except Exception as error:
         print(f"    EAIK does not run: {error}")

@@ -32,7 +32,7 @@ from .ik_queue import load_start, load_target, rest_lane
 REST = 1e-14  # a relative gain below this, several times in a row, ends a start
 
 
-@kernel
+@kernel(borrow=True)
 def cost_block(w, cost):
     """Cost ``cost (L)`` and the error that is its negative gradient."""
     t, r = TARGET, ROT
@@ -56,7 +56,7 @@ def cost_block(w, cost):
         cost[l] = 0.5 * total + 0.5 * (3.0 - trace)
 
 
-@kernel
+@kernel(borrow=True)
 def descend(chain, w, J, q, step):
     """``step = Jᵀ y``, shortened as a whole to half a radian, onto ``q``, clamped to the limits."""
     k = chain.lower.shape[0]
@@ -73,6 +73,26 @@ def descend(chain, w, J, q, step):
         for l in range(L):
             v = q[c * L + l] + step[c * L + l] * 0.5 / w[SCALE + l]
             q[c * L + l] = min(max(v, chain.lower[c]), chain.upper[c])
+
+
+@kernel
+def judge_step(l, k, cost, least, lowest, damping, idle, q, before):
+    """Keep lane l's step if its cost fell, and trust the model more; else take it back, and trust it less.
+
+    ``idle (L)`` counts steps that gained less than *least*, a step taken back as a third of one.
+    """
+    gain = lowest[l] - cost[l]
+    if gain >= 0.0:
+        idle[l] = idle[l] + 1.0 if gain < least else 0.0
+        lowest[l] = cost[l]
+        damping[l] = max(damping[l] * 0.25, 1e-9)
+        for c in range(k):
+            before[c * L + l] = q[c * L + l]
+    else:
+        damping[l] = min(damping[l] * 8.0, 1e6)
+        idle[l] += 0.34
+        for c in range(k):
+            q[c * L + l] = before[c * L + l]
 
 
 @kernel
@@ -108,18 +128,7 @@ def nearest_poses(chain, targets, first, last, guesses, table, order, seed, star
             if t < 0:
                 continue
             age[l] += 1.0
-            gain = lowest[l] - cost[l]
-            if gain >= 0.0:
-                idle[l] = idle[l] + 1.0 if gain < REST * (0.01 + cost[l]) else 0.0
-                lowest[l] = cost[l]
-                damping[l] = max(damping[l] * 0.25, 1e-9)
-                for c in range(k):
-                    before[c * L + l] = q[c * L + l]
-            else:
-                damping[l] = min(damping[l] * 8.0, 1e6)
-                idle[l] += 0.34
-                for c in range(k):
-                    q[c * L + l] = before[c * L + l]
+            judge_step(l, k, cost, REST * (0.01 + cost[l]), lowest, damping, idle, q, before)
             w[LAMBDA + l] = damping[l]
             if idle[l] > 3.0 or age[l] >= most:
                 if lowest[l] < best_cost[t]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
+from .ik_nearest import judge_step
 from .ik_step import normal_equations
 from .ik_tasks import task_block
 from .ik_tree import advance, box_rows, mask_block
@@ -45,18 +46,7 @@ def descend_tree(tree, tasks, data, box, scale, lower, upper, most, first, last,
             working = False
             for l in range(L):
                 total[l] = 0.0 if inside[l] != 0.0 else total[l]
-                gain = lowest[l] - total[l]
-                if gain >= 0.0:
-                    idle[l] = idle[l] + 1.0 if gain < REST * total[l] else 0.0
-                    lowest[l] = total[l]
-                    damping[l] = max(damping[l] * 0.25, 1e-9)
-                    for c in range(n):
-                        before[c * L + l] = x[c * L + l]
-                else:
-                    damping[l] = min(damping[l] * 8.0, 1e6)
-                    idle[l] += 0.34
-                    for c in range(n):
-                        x[c * L + l] = before[c * L + l]
+                judge_step(l, n, total, REST * total[l], lowest, damping, idle, x, before)
                 working = working or idle[l] <= 3.0
             if not working:
                 break
