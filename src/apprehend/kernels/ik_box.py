@@ -10,7 +10,7 @@ from .ik_chain import AGE, DAMPING, ERR, FLAG, FLOOR, GRAM, LAMBDA, PAST, PATIEN
 LOOSE = 1e-3  # tolerances above this (over the reach, or rad) are freedom that steps may use
 
 
-@kernel
+@kernel(borrow=True)
 def box_error(w, tool, box, free_axis):
     """Error in the axes of the target, zero where it is inside a loose ``box (6)``; flags as in `pose_error`.
 
@@ -77,7 +77,7 @@ def box_error(w, tool, box, free_axis):
         w[FLAG + l] = 1.0 if inside else (2.0 if late else 0.0)
 
 
-@kernel
+@kernel(borrow=True)
 def turn_columns(w, tool, J, k):
     """Rows of ``J`` into the axes of the target frame; rows whose error is zero (satisfied) are left out."""
     for l in range(L):

@@ -44,7 +44,7 @@ def priority_work(n, rows):
     )  # fmt: skip
 
 
-@kernel
+@kernel(borrow=True)
 def take_out(B, width, row, u):
     """Reflect the first *width* columns of B so that row *row* is zero but in the last of them; 1 if it is so short
     that there is nothing to take out."""
@@ -70,7 +70,7 @@ def take_out(B, width, row, u):
     return 0
 
 
-@kernel
+@kernel(borrow=True)
 def cholesky(H, n, tiny):
     """Factor the leading n × n of H in place (lower triangle)."""
     for i in range(n):
@@ -85,7 +85,7 @@ def cholesky(H, n, tiny):
         H[i, i] = 1.0 / math.sqrt(max(s, tiny))  # the diagonal holds reciprocals
 
 
-@kernel
+@kernel(borrow=True)
 def back_solve(H, n, x):
     """Solve with the factor of `cholesky` in place."""
     for i in range(n):
@@ -100,7 +100,7 @@ def back_solve(H, n, x):
         x[i] = s * H[i, i]
 
 
-@kernel
+@kernel(borrow=True)
 def shrink_null_space(J, first, last, N, width, A, u):
     """Take the rows first … last of J out of the first *width* columns of N; returns the width that is left.
 
@@ -150,7 +150,7 @@ def shrink_null_space(J, first, last, N, width, A, u):
     return width
 
 
-@kernel
+@kernel(borrow=True)
 def level_step(J, e, first, last, damping, dq, start, B, s, work):
     """Direction ``vector[1]`` from dq to the damped minimiser of one level within the first s columns of B."""
     n = dq.shape[0]
@@ -188,7 +188,7 @@ def level_step(J, e, first, last, damping, dq, start, B, s, work):
         d[k] = dot
 
 
-@kernel
+@kernel(borrow=True)
 def wrong_multiplier(J, e, first, last, damping, dq, start, N, width, work):
     """The held coordinate whose bound pulls the wrong way most, or −1: all multipliers are right."""
     n = dq.shape[0]
@@ -249,7 +249,7 @@ def wrong_multiplier(J, e, first, last, damping, dq, start, N, width, work):
     return found
 
 
-@kernel
+@kernel(borrow=True)
 def prioritised(J, e, levels, damping, lower, upper, dq, work):
     """The step ``dq (n)`` of all levels: rows ``levels[k] … levels[k + 1]`` of ``J (R, n)``, ``e (R)`` are level k.
 
@@ -328,7 +328,7 @@ def prioritised(J, e, levels, damping, lower, upper, dq, work):
     return changes
 
 
-@kernel
+@kernel(borrow=True)
 def brake(distance, acceleration, dt):
     """The largest velocity from which braking by at most *acceleration* in whole steps of dt stays within *distance*.
 
@@ -347,7 +347,7 @@ def brake(distance, acceleration, dt):
     return best
 
 
-@kernel
+@kernel(borrow=True)
 def step_bounds(q, lower, upper, speed, acceleration, before, dt, low, high):
     """Bounds ``low, high (n)`` of the step from the limits of position, velocity and acceleration.
 

@@ -36,7 +36,7 @@ from .ik_chain import (
 TURN = 2.0 * math.pi
 
 
-@kernel
+@kernel(borrow=True)
 def uniform(seed, start, j):
     """A number in [0, 1) that depends on the three arguments only (splitmix64 on their mixture)."""
     x = (
@@ -51,7 +51,7 @@ def uniform(seed, start, j):
     return float(x >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@kernel
+@kernel(borrow=True)
 def load_start(chain, guesses, table, order, seed, target, start, q, l):
     """Start number *start* of *target* into lane *l* of ``q``."""
     k = chain.lower.shape[0]
@@ -69,14 +69,14 @@ def load_start(chain, guesses, table, order, seed, target, start, q, l):
             q[c * L + l] = low + (chain.high[c] - low) * uniform(seed, start, c)
 
 
-@kernel
+@kernel(borrow=True)
 def load_target(targets, target, w, l):
     """Rotation and position of *target* into lane *l*."""
     for i in range(12):
         w[TARGET + i * L + l] = targets[target, i]
 
 
-@kernel
+@kernel(borrow=True)
 def is_new(chain, q, l, found, count, distinct):
     """Whether lane *l* differs from all solutions found so far by more than *distinct* in some coordinate."""
     for s in range(count):
@@ -92,7 +92,7 @@ def is_new(chain, q, l, found, count, distinct):
     return True
 
 
-@kernel
+@kernel(borrow=True)
 def evaluate(chain, q, axes, w, tolerance, partial, free_axis):
     """Pose, error and flags of all lanes."""
     forward(chain, q, axes, w)
@@ -106,7 +106,7 @@ def evaluate(chain, q, axes, w, tolerance, partial, free_axis):
         box_error(w, chain.tool, tolerance, free_axis)
 
 
-@kernel
+@kernel(borrow=True)
 def newton(chain, q, axes, w, J, step, partial):
     """One step of all lanes."""
     k = chain.lower.shape[0]
@@ -122,7 +122,7 @@ def newton(chain, q, axes, w, J, step, partial):
     advance(chain, q, w, J, step)
 
 
-@kernel
+@kernel(borrow=True)
 def rest_lane(w, l):
     """A lane without work: its target is the identity, its error is never looked at."""
     for i in range(12):
@@ -131,7 +131,7 @@ def rest_lane(w, l):
     w[PAST + l] = 1e300
 
 
-@kernel
+@kernel(borrow=True)
 def fresh_lane(w, l):
     """A lane that has just taken a start: no step in this round, its error belongs to the old one."""
     w[AGE + l] = 0.0

@@ -56,7 +56,7 @@ def refine(chain, targets, owner, first, last, x, most, error):
             newton(chain, q, axes, w, J, step, False)
 
 
-@kernel
+@kernel(borrow=True)
 def on_nearest_turn(value, near, lower, upper):
     """An angle on the turn nearest to *near* that is within the limits, if any is."""
     value -= TURN * math.floor((value - near) / TURN + 0.5)
@@ -67,7 +67,7 @@ def on_nearest_turn(value, near, lower, upper):
     return value
 
 
-@kernel
+@kernel(borrow=True)
 def _alike(x, a, b, unit):
     """Whether two rows are the same joint vector but for `SAME` and whole turns."""
     for c in range(unit.shape[0]):

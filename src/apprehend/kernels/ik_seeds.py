@@ -36,7 +36,7 @@ def chain_features(chain, q, out):
                 out[first + l, 9 + i] = w[POS + i * L + l]
 
 
-@kernel
+@kernel(borrow=True)
 def chain_targets(poses, before, tool, reach, first, last, out):
     """Poses ``(N, 16)`` in the world as targets ``out (N, 12)`` of a chain: rotation (9), position (3) over the reach."""
     for i in range(first, last):
@@ -120,7 +120,7 @@ def nearest_starts(table, half, targets, first, last, order):
                 order[block + l, g] = int(indices[g, l])
 
 
-@kernel
+@kernel(borrow=True)
 def residuals(reached, wanted, first, last, out):
     """Distance and angle ``out (N, 2)`` between rows of poses ``(N, 16)``."""
     for i in range(first, last):

@@ -24,7 +24,7 @@ from .vector import larger, load, magnitude, select, smaller, splat, store
 L = LANES
 
 
-@kernel
+@kernel(borrow=True)
 def box_rows(e, box, scale, total, inside):
     """Errors over ``scale (R)``; inside a loose ``box (R)`` they are zero, outside they are measured from half of it."""
     sum_, all_ = splat(0.0), splat(1.0)
@@ -41,7 +41,7 @@ def box_rows(e, box, scale, total, inside):
     store(inside, 0, all_)
 
 
-@kernel
+@kernel(borrow=True)
 def mask_block(J, e, scale, q, lower, upper, rows, n):
     """Scale the rows, leave out satisfied ones, and coordinates at a limit that the gradient pushes outward."""
     for c in range(n):
@@ -59,7 +59,7 @@ def mask_block(J, e, scale, q, lower, upper, rows, n):
             store(J, o, select(out, 0.0, load(J, o)))
 
 
-@kernel
+@kernel(borrow=True)
 def advance(q, step, lower, upper, n):
     """``q += step``, shortened as a whole to `STEP`, then clamped to the limits."""
     largest = splat(STEP)
