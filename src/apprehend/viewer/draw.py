@@ -79,7 +79,7 @@ def stage_of(what: Any) -> Stage:
             placed = what.bodies[name]
             colour = BODY_COLOURS[i % len(BODY_COLOURS)]
             things[name] = Thing(name, placed.body.vertices, placed.body.faces, placed.pose, colour)
-        boxes = tuple(box(b.name, b.size.tolist(), b.pose, b.rgba) for b in what.boxes)
+        boxes = tuple(box(b.name, b.size.tolist(), b.pose, b.rgba) for b in what.boxes) + obstacles_of(what)
         ghosts = tuple(
             Thing(f"goal of {name}", things[name].vertices, things[name].faces, pose, (0.25, 0.62, 0.36, GHOST_ALPHA))
             for name, pose in what.goals.items()
@@ -87,6 +87,17 @@ def stage_of(what: Any) -> Stage:
         return Stage(what.robot, link_parts(what.robot.description), tuple(things.values()), boxes, ghosts)
     raise InputError(
         f"cannot draw a {type(what).__name__}; expected a scene, robot, body, their models, a stage, or a list of Items"
+    )
+
+
+def obstacles_of(scene: Scene) -> tuple[Thing, ...]:
+    """The scene's obstacles as things to draw."""
+    from ..collision.outlines import triangles
+
+    return tuple(
+        Thing(name, *triangles(shape), np.eye(4), obstacle.rgba)
+        for name, obstacle in scene.obstacles.items()
+        for shape in obstacle.shapes
     )
 
 
