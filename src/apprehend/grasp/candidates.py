@@ -28,6 +28,8 @@ class PlanStatus(Status):
     NO_ROOM = "the open hand has no room: it would hit the body, or the table, wherever it could close"
     NO_CONTACT = "the pads would not meet opposite surfaces firmly enough"
     NO_CLOSURE = "wherever the fingers touch, the contacts do not resist every wrench"
+    OUT_OF_REACH = "no set of contacts that closes is within the reach of the fingers"
+    TOO_FEW = "too few links touch the body where the fingers close"
     TOO_WEAK = "the hand is too weak to hold the body with the friction given"
 
 

@@ -76,10 +76,10 @@ class HandSearch:
     def _why(self) -> PlanStatus:
         causes = {
             "no contacts that close lie before the pads": PlanStatus.NO_CLOSURE,
-            "out of the fingers' reach": PlanStatus.NO_APPROACH,
+            "out of the fingers' reach": PlanStatus.OUT_OF_REACH,
             "comes from another side than asked for": PlanStatus.NO_APPROACH,
             "no room for the open hand": PlanStatus.NO_ROOM, "hits the table": PlanStatus.NO_ROOM,
-            "too few contacts": PlanStatus.NO_CONTACT, "no force closure": PlanStatus.NO_CLOSURE,
+            "too few contacts": PlanStatus.TOO_FEW, "no force closure": PlanStatus.NO_CLOSURE,
             "too weak": PlanStatus.TOO_WEAK,
         }  # fmt: skip
         worst = max(causes, key=lambda cause: self.rejected[cause])
