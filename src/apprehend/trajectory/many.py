@@ -13,6 +13,7 @@ from ..arrays import Array, BoolArray, IntArray
 from ..errors import InputError, UnsuccessfulError
 from ..kernels import timing_lanes as kernels
 from ..kernels.timing_cubic import WIDE
+from ..kinematics import memory
 from ..parallel import over_ranges
 from ..result import Result
 from .constraints import Constraint
@@ -164,14 +165,11 @@ def _on_lanes(
             data = breaks[own_breaks], coefficients[own], own_first, parts[own]
         else:
             data = breaks, coefficients, first, parts
-        grids, x, durations = (
-            np.empty((chosen.size, size + 1)),
-            np.empty((chosen.size, size + 1)),
-            np.empty(chosen.size),
-        )
+        count = int(chosen.size)
+        grids, x, durations = memory.empty(count, int(size) + 1), memory.empty(count, int(size) + 1), np.empty(count)
 
         def work(start: int, stop: int, data: Any = data, out: Any = (grids, x, durations)) -> None:
             kernels.solve_many(*data, vlim, alim, NO_SAMPLES, NO_BOUNDS, table, x_start, x_end, start, stop, *out)
 
-        over_ranges(work, -(-chosen.size // WIDE))
+        over_ranges(work, -(-count // WIDE))
         yield chosen, _Group(grids, x, durations)
