@@ -19,7 +19,7 @@ CUBE = "\n".join(
 
 def run(*args: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     program = "from apprehend.cli import main; main()"
-    return subprocess.run([sys.executable, "-c", program, *args], capture_output=True, text=True, cwd=cwd, timeout=280)
+    return subprocess.run([sys.executable, "-c", program, *args], capture_output=True, text=True, cwd=cwd, timeout=800)
 
 
 def test_help_lists_the_commands() -> None:
