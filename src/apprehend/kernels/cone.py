@@ -98,7 +98,7 @@ def _fetch(lane, columns, right, wrench, cones, slack, floor, begin, warm, A, V_
     K[NORM_C, lane], K[KAPPA, lane] = largest, dot / cones.shape[0]
 
 
-@kernel
+@kernel(inline=True)
 def _measure(A, V_, R, K, degree):  # type: ignore[no-untyped-def]
     """Residuals of all places, and the numbers that decide about them."""
     tau, kappa = load(K, TAU), load(K, KAPPA)
@@ -144,7 +144,7 @@ def _measure(A, V_, R, K, degree):  # type: ignore[no-untyped-def]
     store(K, QUAD, quad)
 
 
-@kernel
+@kernel(inline=True)
 def _keep(V_, R, K, best):  # type: ignore[no-untyped-def]
     """Remember the best iterate of each place and its figures; may be called again without a step between."""
     n, rows = V_.shape[1], R.shape[1]
@@ -235,7 +235,7 @@ def _direction(phase, rest, A, L, S, V_, R, cones):  # type: ignore[no-untyped-d
     return t
 
 
-@kernel
+@kernel(inline=True)
 def _prepare(A, Ah, S, W, L, V_, R, cones, share):  # type: ignore[no-untyped-def]
     """Scaling and factors at the current point."""
     scaling(V_, cones, X, Z)
@@ -253,7 +253,7 @@ def _prepare(A, Ah, S, W, L, V_, R, cones, share):  # type: ignore[no-untyped-de
     factor(S, 0, A.shape[1])
 
 
-@kernel
+@kernel(inline=True)
 def _advance(A, Ah, S, W, L, V_, R, K, cones):  # type: ignore[no-untyped-def]
     """One step of all places: the direction of the embedding's constant, predictor, corrector."""
     n, rows = A.shape[0], A.shape[1]
@@ -309,7 +309,7 @@ def _advance(A, Ah, S, W, L, V_, R, K, cones):  # type: ignore[no-untyped-def]
     _move(alpha, tau + alpha * dtau, kappa + alpha * dkappa, V_, R, K)
 
 
-@kernel
+@kernel(inline=True)
 def _move(alpha, tau, kappa, V_, R, K):  # type: ignore[no-untyped-def]
     """Go a step where it leads on, and keep numbers near one: the embedding is homogeneous."""
     good = alpha > 1e-9

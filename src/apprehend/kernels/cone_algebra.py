@@ -17,7 +17,7 @@ SCALING, LAMBDA, BETA, BACK, SHARE, DEPTH, TILT = 0, 1, 2, 3, 4, 5, 6
 1 / (1 + w₀), the inverse of λ's depth √(λ₀² − ‖λ₁…‖²), and 1 / (λ₀ + depth)."""
 
 
-@kernel
+@kernel(inline=True)
 def scaling(V, cones, x, z):  # type: ignore[no-untyped-def]
     """Nesterov–Todd scaling of each cone: unit vector w and factor β with ``W z = W⁻¹ x = λ``; NaN outside."""
     s = 0
@@ -75,7 +75,7 @@ def apply(V, cones, sign, v, out):  # type: ignore[no-untyped-def]
         s = end
 
 
-@kernel
+@kernel(inline=True)
 def apply_rows(V, cones, A, out):  # type: ignore[no-untyped-def]
     """``W Aᵀ`` for a matrix by columns ``(n, rows, WIDTH)``: `apply` to each of its rows."""
     s = 0
@@ -105,7 +105,7 @@ def apply_rows(V, cones, A, out):  # type: ignore[no-untyped-def]
         s = end
 
 
-@kernel
+@kernel(inline=True)
 def quotient(V, cones, a, b, minus, out):  # type: ignore[no-untyped-def]
     """The u with ``λ ∘ u = a ∘ b − minus e`` in the Jordan algebra of each cone."""
     s = 0

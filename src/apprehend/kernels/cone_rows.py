@@ -36,7 +36,7 @@ def gather(A, columns, x, rows, out):  # type: ignore[no-untyped-def]
         store2(rows, out, r + 2, t2)
 
 
-@kernel
+@kernel(inline=True)
 def gram(A, S):  # type: ignore[no-untyped-def]
     """``S = A Aᵀ``, its lower part."""
     n, rows = A.shape[0], A.shape[1]
