@@ -19,12 +19,15 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, IntArray
+from ..parallel import over_ranges
 
 KEPT = 24
 """Candidates kept of every pose, doubles included; six revolute joints have up to 16 branches (Primrose 1986)."""
 NEARLY_REAL = 1e-2
 """Imaginary part, over 1 + |x|, up to which an eigenvalue is tried: double roots split by the root of the rounding."""
-BLOCK = 512
+BLOCK = 256
+GRAIN = 16
+"""Smallest share of a batch that is worth a thread."""
 
 _ANGLES = 2.0 * np.pi * np.arange(3) / 3.0
 _SAMPLES = np.stack([np.ones(3), np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
@@ -138,13 +141,17 @@ def general_branches(h: Array, o: Array, R0: Array, poses: Array) -> tuple[Array
     if not len(poses):
         return x, number
     k = first_pair(h[0], o[0])
-    for first in range(0, len(poses), BLOCK):
-        part = slice(first, first + BLOCK)
-        own = part if len(h) > 1 else slice(0, 1)
-        theta, good = _candidates(h[own], o[own], R0[own], k, poses[part])
-        order = np.argsort(~good, axis=1, kind="stable")[:, :KEPT]
-        x[part] = np.take_along_axis(np.roll(theta, k, axis=2), order[..., None], axis=1)
-        number[part] = np.minimum(good.sum(axis=1), KEPT)
+
+    def work(begin: int, end: int) -> None:
+        for first in range(begin, end, BLOCK):
+            part = slice(first, min(first + BLOCK, end))
+            own = part if len(h) > 1 else slice(0, 1)
+            theta, good = _candidates(h[own], o[own], R0[own], k, poses[part])
+            order = np.argsort(~good, axis=1, kind="stable")[:, :KEPT]
+            x[part] = np.take_along_axis(np.roll(theta, k, axis=2), order[..., None], axis=1)
+            number[part] = np.minimum(good.sum(axis=1), KEPT)
+
+    over_ranges(work, len(poses), GRAIN)
     return x, number
 
 
