@@ -41,7 +41,7 @@ class Refine:
     """
 
     name: str = "refine"
-    title: str = "Look closer with the hand camera"
+    title: str = "Look with the hand camera"
     camera: Camera = field(default_factory=lambda: Camera.from_fov(320, 240))
     noise: Noise = field(default_factory=Noise)
 
