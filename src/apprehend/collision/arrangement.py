@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..robots import Semantics
     from .scene import Scene
 
-RESOLUTION = 1e-3
+RESOLUTION = 2e-5
 """Default of `CollisionModel.resolution`, in m."""
 
 NONE = np.zeros(0, np.int64)

@@ -158,10 +158,9 @@ def _free(
 ) -> PlanResult:  # fmt: skip
     """RRT-Connect, and shortcuts."""
     search = Search(model, task.start, task.goals[task.usable], max_nodes)
-    until += search.compile()
     while True:
         status = search.grow(rng, task.low, task.high)
-        if status != collide_plan.MORE or time.perf_counter() > until:
+        if status != collide_plan.MORE or time.perf_counter() - search.compiling > until:
             break
     a, b = (int(count) for count in search.count)
     if status != collide_plan.CONNECTED:

@@ -50,25 +50,20 @@ class Search:
         self.nodes[1, : len(goals)] = goals
         self.samples = 0
         self.chunk = 64
-
-    def compile(self) -> float:
-        """Make sure that the kernel is compiled; the seconds that it took."""
-        began, chunk = time.perf_counter(), self.chunk
-        self.chunk = 0
-        nothing = np.zeros(self.nodes.shape[2])
-        self.grow(np.random.default_rng(0), nothing, nothing)
-        self.chunk = chunk
-        return time.perf_counter() - began
+        self.compiling = 0.0  # seconds that went into compiling the kernel, in the first run of its kind
 
     def grow(self, rng: np.random.Generator, lower: Array, upper: Array) -> int:
         """Try one more portion of random configurations."""
         samples = rng.uniform(lower, upper, (self.chunk, len(lower)))
         across = float(np.linalg.norm(upper - lower))
+        began, known = time.perf_counter(), len(collide_plan.grow.signatures)
         status, used = collide_plan.grow(
             self.model.compiled, self.model.lanes,
             self.nodes, self.parent, self.domain, self.count,
             samples, STRIDE, WIDEST * across, LEAST * across, self.model.clearance, self.model.resolution,
         )  # fmt: skip
+        if len(collide_plan.grow.signatures) > known:
+            self.compiling += time.perf_counter() - began
         self.samples += int(used)
         self.chunk = min(2 * self.chunk, 512)
         if status == collide_plan.FULL and self.nodes.shape[1] < self.most:
