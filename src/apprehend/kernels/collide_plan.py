@@ -22,7 +22,7 @@ FULL = 2
 MORE = 0
 
 
-@kernel
+@kernel(borrow=True)
 def nearest_node(nodes, count, q):
     """The row of ``nodes[:count]`` nearest to *q*, and its distance."""
     best, row = 1e300, 0
@@ -37,7 +37,7 @@ def nearest_node(nodes, count, q):
     return row, math.sqrt(best)
 
 
-@kernel
+@kernel(borrow=True)
 def extend(exact, lanes, nodes, parent, count, q, stride, greedy, margin, resolution, space):
     """Grow a tree towards *q* by steps of at most *stride*: one, or (*greedy*) as many as are free.
 
@@ -98,7 +98,7 @@ def grow(exact, lanes, nodes, parent, domain, count, samples, stride, widest, le
     return MORE, samples.shape[0]
 
 
-@kernel
+@kernel(borrow=True)
 def length(path, a, b):
     """Length of the polyline from vertex *a* to vertex *b*."""
     total = 0.0
@@ -111,7 +111,7 @@ def length(path, a, b):
     return total
 
 
-@kernel
+@kernel(borrow=True)
 def point_at(path, count, s, out):
     """The point at arc length *s*; returns the vertex before it."""
     for i in range(count - 1):
@@ -125,7 +125,7 @@ def point_at(path, count, s, out):
     return 0
 
 
-@kernel
+@kernel(borrow=True)
 def skip_vertices(exact, lanes, path, count, margin, resolution, space):
     """Drop vertices that a straight motion can pass by, the farthest leaps first; returns the new count."""
     n = path.shape[1]

@@ -32,7 +32,7 @@ def edge_space(exact, lanes, n):
     )  # fmt: skip
 
 
-@kernel
+@kernel(borrow=True)
 def motion_rates(model, qa, qb, rates, speed, turning):
     """How fast pairs of nodes, and nodes and the world, can approach along ``qa → qb``, per unit of the motion."""
     links, joints, nodes, selves = model.links, model.joints, model.nodes, model.selves
@@ -56,7 +56,7 @@ def motion_rates(model, qa, qb, rates, speed, turning):
         rates[B + k] = total
 
 
-@kernel
+@kernel(borrow=True)
 def bound(balls, k, radius, out):
     """A ball around the balls of *radius* about the centres of node *k*."""
     L = LANES
@@ -72,7 +72,7 @@ def bound(balls, k, radius, out):
     out[k, 3] = 0.5 * math.sqrt(total) + radius
 
 
-@kernel
+@kernel(borrow=True)
 def may_meet(bounds, k, fixed, o, more):
     """Whether the ball around node *k*, grown by *more*, meets the box around a fixed shape."""
     px, py, pz = bounds[k, 0] - fixed[o, 9], bounds[k, 1] - fixed[o, 10], bounds[k, 2] - fixed[o, 11]
@@ -83,14 +83,14 @@ def may_meet(bounds, k, fixed, o, more):
     return dx * dx + dy * dy + dz * dz <= reach * reach
 
 
-@kernel
+@kernel(borrow=True)
 def clear_marks(flags):
     """No lane is marked."""
     for lane in range(2 * LANES):
         flags[lane] = 0.0
 
 
-@kernel
+@kernel(borrow=True)
 def marked_fixed(lanes, space, k, o, rate, margin, resolution):
     """Mark the lanes in which spheres of node *k* may meet fixed shape *o*; whether there are any."""
     parts, spheres, nodes, fixed, own = lanes.parts, lanes.spheres, lanes.nodes, lanes.fixed, space.lanes
@@ -115,7 +115,7 @@ def marked_fixed(lanes, space, k, o, rate, margin, resolution):
     return near
 
 
-@kernel
+@kernel(borrow=True)
 def marked_selves(lanes, space, a, b, rate, margin, resolution):
     """As `marked_fixed`, for the spheres of two moving nodes."""
     parts, spheres, nodes, own = lanes.parts, lanes.spheres, lanes.nodes, space.lanes
@@ -135,7 +135,7 @@ def marked_selves(lanes, space, a, b, rate, margin, resolution):
     return near
 
 
-@kernel
+@kernel(borrow=True)
 def note(state, flags):
     """Merge the marks of a pair whose spheres are exact into the state of the lanes; whether any lane is hit."""
     hit = 0.0
@@ -145,7 +145,7 @@ def note(state, flags):
     return hit > 0.0
 
 
-@kernel
+@kernel(borrow=True)
 def block_hit(model, lanes, space, margin, resolution):
     """Whether any lane hits something; if not, ``state`` says which pieces are open."""
     parts, nodes, owns, own = lanes.parts, lanes.nodes, lanes.owns, space.lanes
@@ -196,7 +196,7 @@ def block_hit(model, lanes, space, margin, resolution):
     return False
 
 
-@kernel
+@kernel(borrow=True)
 def next_pieces(space, head, count):
     """Take up to sixteen pieces out of the queue, cut into equal parts where there are fewer of them.
 
@@ -218,7 +218,7 @@ def next_pieces(space, head, count):
     return (head + taken) % QUEUE if count <= DEEP else head, count - taken, used
 
 
-@kernel
+@kernel(borrow=True)
 def edge_blocked(exact, lanes, qa, qb, margin, resolution, space):
     """Whether the straight motion ``qa → qb`` hits anything.
 

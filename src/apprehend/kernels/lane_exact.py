@@ -35,7 +35,7 @@ class EdgeSpace(NamedTuple):
     order: np.ndarray  # (C,) int64: rows of ``meets``, the more often hit the earlier
 
 
-@kernel
+@kernel(borrow=True)
 def put_shapes(model, lanes, space, k, lane):
     """Put the exact shapes of node *k* where they are in one lane; their poses follow on demand."""
     L = LANES
@@ -53,7 +53,7 @@ def put_shapes(model, lanes, space, k, lane):
         shapes[g, DONE] = 0.0
 
 
-@kernel
+@kernel(borrow=True)
 def drift(lanes, space, carrier, both, lane, ball, r, nx, ny, nz):
     """Motion along the unit vector n of the *ball* on *carrier*: of its centre, and what turning adds.
 
@@ -81,7 +81,7 @@ def drift(lanes, space, carrier, both, lane, ball, r, nx, ny, nz):
     return along, r * math.sqrt(cx * cx + cy * cy + cz * cz)
 
 
-@kernel
+@kernel(borrow=True)
 def still_apart(model, lanes, space, a, b, both, lane, g, h, margin, rate):
     """For how much of the motion shapes *g* and *h* stay farther apart than *margin*, by the plane found last.
 
@@ -114,7 +114,7 @@ def still_apart(model, lanes, space, a, b, both, lane, g, h, margin, rate):
     return 2.0 * gap / (V + math.sqrt(V * V + 4.0 * space.turning[0] * rate * gap) + 1e-300)
 
 
-@kernel
+@kernel(borrow=True)
 def middle_marked(marks):
     """The marked lane nearest to the middle of the marked range, or −1."""
     first, last = -1, -1
@@ -129,7 +129,7 @@ def middle_marked(marks):
     return best
 
 
-@kernel
+@kernel(borrow=True)
 def settle(model, lanes, space, a, b, both, first, stride, count, margin, rate, resolution):
     """Ask the exact shapes of nodes *a* and *b* (−1: fixed) in the lanes that are marked; whether any of them touch.
 

@@ -23,7 +23,7 @@ def at(index, width):
     return (index & 0xFFFFFFF) * width * LANES
 
 
-@kernel
+@kernel(borrow=True)
 def near_fixed(fixed, o, points, k, radius, rate, resolution, flags, mark):
     """Whether sphere *k* of *points* with *radius* meets fixed shape *o*; returns whether any lane does.
 
@@ -60,7 +60,7 @@ def near_fixed(fixed, o, points, k, radius, rate, resolution, flags, mark):
     return total > 0.0
 
 
-@kernel
+@kernel(borrow=True)
 def near_grid(model, o, points, k, radius, rate, resolution, flags, mark):
     """As `near_fixed`, for a half-space or a grid."""
     L = LANES
@@ -101,7 +101,7 @@ def near_grid(model, o, points, k, radius, rate, resolution, flags, mark):
     return total > 0.0
 
 
-@kernel
+@kernel(borrow=True)
 def mark_lanes(radius, rate, resolution, flags):
     """Note hard and soft hits of the squared distances in row 3 of *flags*."""
     L = LANES
@@ -113,7 +113,7 @@ def mark_lanes(radius, rate, resolution, flags):
         flags[L + lane] = max(flags[L + lane], 1.0 if d <= soft * soft else 0.0)
 
 
-@kernel
+@kernel(borrow=True)
 def near_sphere(a, i, b, j, radius, rate, resolution, flags, mark):
     """As `near_fixed`, for sphere *i* of points *a* and sphere *j* of points *b* with the sum of their radii."""
     L = LANES

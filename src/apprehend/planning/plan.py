@@ -136,11 +136,11 @@ def _task(
             first = int(usable[0])
             return PlanResult(PlanStatus.GOALS_OFF_CONSTRAINT, detail=f"Goal {first}: {keep.why(targets[first])}.")
         usable = usable[kept]
-    # joints without limits: half a turn around the start and the goals
-    span = np.concatenate([q0[None], targets[usable]])
-    low = np.where(np.isfinite(lower), lower, span.min(axis=0) - np.pi)
-    high = np.where(np.isfinite(upper), upper, span.max(axis=0) + np.pi)
-    return _Task(q0, targets, usable, low, high)
+    if not np.isfinite(upper - lower).all():  # joints without limits: half a turn around the start and the goals
+        span = np.concatenate([q0[None], targets[usable]])
+        lower = np.where(np.isfinite(lower), lower, span.min(axis=0) - np.pi)
+        upper = np.where(np.isfinite(upper), upper, span.max(axis=0) + np.pi)
+    return _Task(q0, targets, usable, lower, upper)
 
 
 def _direct(model: CollisionModel, task: _Task, keep: Constraints | None) -> int:

@@ -12,10 +12,10 @@ from ..collision import CollisionModel
 from ..errors import InputError
 from ..kernels import collide_edges, collide_plan
 
-STRIDE = 0.8
+STRIDE = 1.5
 """Largest step of a tree in joint space, in rad (and m)."""
 
-WIDEST, LEAST = 0.45, 0.2
+WIDEST, LEAST = 0.5, 0.25
 """Bounds of a node's domain (see `kernels.collide_plan.grow`) relative to the diagonal of the joint space."""
 
 FIRST_ROOM = 512
@@ -54,15 +54,17 @@ class Search:
 
     def grow(self, rng: np.random.Generator, lower: Array, upper: Array) -> int:
         """Try one more portion of random configurations."""
-        samples = rng.uniform(lower, upper, (self.chunk, len(lower)))
+        samples = rng.random((self.chunk, len(lower)))
+        samples *= upper - lower
+        samples += lower
         across = float(np.linalg.norm(upper - lower))
-        began, known = time.perf_counter(), len(collide_plan.grow.signatures)
+        began, known = time.perf_counter(), len(collide_plan.grow.overloads)
         status, used = collide_plan.grow(
             self.model.compiled, self.model.lanes,
             self.nodes, self.parent, self.domain, self.count,
             samples, STRIDE, WIDEST * across, LEAST * across, self.model.clearance, self.model.resolution,
         )  # fmt: skip
-        if len(collide_plan.grow.signatures) > known:
+        if len(collide_plan.grow.overloads) > known:
             self.compiling += time.perf_counter() - began
         self.samples += int(used)
         self.chunk = min(2 * self.chunk, 512)
