@@ -49,7 +49,7 @@ class Search:
         self.nodes[0, 0] = start
         self.nodes[1, : len(goals)] = goals
         self.samples = 0
-        self.chunk = 64
+        self.chunk = 192
         self.compiling = 0.0  # seconds that went into compiling the kernel, in the first run of its kind
 
     def grow(self, rng: np.random.Generator, lower: Array, upper: Array) -> int:
