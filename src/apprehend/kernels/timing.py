@@ -28,7 +28,7 @@ GRADED_FROM = 30
 """Grids of fewer intervals are even."""
 
 
-@kernel
+@kernel(borrow=True)
 def extreme(rows, size, lane, least, most, y_low, y_high, sign):
     """Largest (sign = 1) or smallest (sign = −1) x in [least, most] that leaves a y in [y_low, y_high]; −1 if none.
 
@@ -80,7 +80,7 @@ def extreme(rows, size, lane, least, most, y_low, y_high, sign):
     return x
 
 
-@kernel
+@kernel(borrow=True)
 def profile(grid, rows, size, pinned, x_start, x_end, simple, alpha, beta, x):
     """Path speed squared ``x (N + 1,)`` at the grid points, as fast as the rows allow.
 
@@ -118,7 +118,7 @@ def profile(grid, rows, size, pinned, x_start, x_end, simple, alpha, beta, x):
     return OK, count
 
 
-@kernel
+@kernel(borrow=True)
 def mirror(rows, size, count, out):
     """The same rows with the grid run backwards: solved for x instead of y; one row more."""
     end = 3 * size * WIDE
@@ -140,7 +140,7 @@ def mirror(rows, size, count, out):
         file_row(0.0, 1.0, here[end + lane], here[end + WIDE + lane], size, to, size + 1, there)
 
 
-@kernel
+@kernel(borrow=True)
 def collapses(x, pinned):
     """Whether the speed collapses from one grid point to the next and recovers: what the greedy choice can spoil."""
     count = 0
@@ -150,7 +150,7 @@ def collapses(x, pinned):
     return count > 0
 
 
-@kernel
+@kernel(borrow=True)
 def duration(grid, x):
     """Time of the profile *x*; infinite if it stands still over an interval."""
     total = 0.0
@@ -193,7 +193,7 @@ def relieve(grid, rows, size, pinned, x_start, x_end, simple, x):
         x[i] = (1.0 - chosen) * x[i] + chosen * back[count - i]
 
 
-@kernel
+@kernel(borrow=True)
 def times(grid, x, t, timing):
     """Times at the grid points, and s on every interval as low-first quadratic coefficients ``(N, 3)`` in t − t_i."""
     t[0] = 0.0
@@ -207,7 +207,7 @@ def times(grid, x, t, timing):
         timing[i, 2] = (x[i + 1] - x[i]) / (4.0 * h)
 
 
-@kernel
+@kernel(borrow=True)
 def split_evenly(breaks, count, least, parts):
     """Intervals ``parts (K,)`` per piece: near their share of *count*, at least *least*; returns their sum.
 
@@ -240,7 +240,7 @@ def grid_parts(breaks, count, least, parts):
     return split_evenly(breaks, count - extra, least, parts) + extra
 
 
-@kernel
+@kernel(borrow=True)
 def subdivide(breaks, parts, out):
     """The grid with ``parts (K,)`` equal intervals in every piece; the first and the last one are divided further
     where *out* has room, ever finer towards the end: next to rest, a constant acceleration serves badly over a long

@@ -23,7 +23,7 @@ WORK = 6
 """Lane components of scratch: five Bernstein coefficients of velocity², and the largest x."""
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrow=True)
 def _hull(c1, c2, c3, z, h):
     """Bernstein coefficients v0, v1, v2 of q' and w0, w1 of q'' on [z, z + h], of the cubic with c1, c2, c3 about 0."""
     second = c2 + 3.0 * z * c3
@@ -34,7 +34,7 @@ def _hull(c1, c2, c3, z, h):
     return v0, v1, v0 + w0 * h + 0.5 * bend * h, w0, w0 + bend
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrow=True)
 def _join_velocity(v0, v1, v2, fast, back, lane, work):
     """The square of q' as a share of its limit joins the worst of the other joints."""
     top = max(v0, max(v1, v2))
@@ -47,13 +47,13 @@ def _join_velocity(v0, v1, v2, fast, back, lane, work):
     work[4 * WIDE + lane] = max(work[4 * WIDE + lane], v2 * v2 * weight)
 
 
-@kernel(inline=True)
+@kernel(inline=True, borrow=True)
 def _pairs(v0, v1, v2, w0, w1, half):
     """a and b of the three rows: see the head of this module."""
     return w0 - v0 * half, v0 * half, 0.5 * w1 - v1 * half, 0.5 * w0 + v1 * half, -v2 * half, w1 + v2 * half
 
 
-@kernel
+@kernel(borrow=True)
 def _joint_rows(j, n, c, place, fast, back, lowest, highest, work, out):
     """Three acceleration rows of joint j into *out*; its velocity² joins the worst in *work*, the bounds on x alone (of
     rows whose coefficient of y vanishes) the least.
@@ -91,7 +91,7 @@ def _joint_rows(j, n, c, place, fast, back, lowest, highest, work, out):
         work[5 * WIDE + lane] = min(work[5 * WIDE + lane], most)
 
 
-@kernel
+@kernel(borrow=True)
 def cubic_rows(c, place, n, vlim, alim, work, size, out):
     """Rows of one block of intervals of cubics with the coefficients 1 … 3 ``c (3 n WIDE)``; returns their number.
 
@@ -131,7 +131,7 @@ def cubic_rows(c, place, n, vlim, alim, work, size, out):
     return 3 * n + 5
 
 
-@kernel
+@kernel(borrow=True)
 def _reach_joint(j, n, c, place, fast, back, lowest, highest, work, xy):
     """Lower y as far as the acceleration rows of joint j ask for: ``xy (2 WIDE)`` holds x and y."""
     at1 = j * WIDE & MASK
@@ -153,7 +153,7 @@ def _reach_joint(j, n, c, place, fast, back, lowest, highest, work, xy):
         xy[WIDE + lane] = min(xy[WIDE + lane], y)
 
 
-@kernel
+@kernel(borrow=True)
 def reach(c, place, n, vlim, alim, work, xy):
     """The largest y that the rows of `cubic_rows` leave at x, and no more than y: both in ``xy (2 WIDE)``."""
     for k in range(5 * WIDE):

@@ -24,7 +24,7 @@ TOP, TOP_BASE, TOP_SLOPE, BOTTOM, BOTTOM_BASE, BOTTOM_SLOPE, DONE, X, LEAST, MOS
 )  # fmt: skip
 
 
-@kernel
+@kernel(borrow=True)
 def extreme_lanes(rows, n, size, sign, state):
     """`timing.extreme` on all lanes: x from LEAST, MOST, Y_LOW, Y_HIGH of *state*; −1 where there is none."""
     for lane in range(WIDE):
@@ -73,7 +73,7 @@ def extreme_lanes(rows, n, size, sign, state):
             break
 
 
-@kernel
+@kernel(borrow=True)
 def _meet_joint(rows, j, state):
     """The least upper and the largest lower bound of y at x, after the three acceleration rows of joint j."""
     at = 9 * j * WIDE & MASK  # masked here: what is not known to be positive is not vectorised
@@ -120,7 +120,7 @@ def _meet_joint(rows, j, state):
         state[BOTTOM_SLOPE + lane] = m if more else bs
 
 
-@kernel
+@kernel(borrow=True)
 def _interval(i, grid, breaks, coefficients, first, begin, last, piece, c, n, place):
     """Put interval i of every lane's path in *place* ``(5 WIDE)``: offset, length h, 1/2h, and the ends of its piece.
 
