@@ -326,8 +326,9 @@ def answers(
 def refuse(program: Program, wrenches: Array, out: Array) -> None:
     """Mark the wrenches that no forces balance, whatever the cones: the part that the balance rows miss proves it."""
     first = len(program.missed)
-    b = program.b0[0, :first] - wrenches @ program.B[:first].T
-    outside = b @ program.missed
+    # einsum, not @: BLAS's threads go on spinning after a product and would hold the core that the solver's need
+    b = program.b0[0, :first] - np.einsum("nj,ij->ni", wrenches, program.B[:first])
+    outside = np.einsum("ni,ij->nj", b, program.missed)
     bad = (outside * outside).sum(axis=1) > 1e-18 * (b * b).sum(axis=1)
     m = 2 * program.n + program.right.shape[1]
     out[bad, m : m + 3] = kernel.INFEASIBLE, np.inf, np.inf

@@ -268,7 +268,8 @@ def batch(
     codes = out[:, e].astype(np.int64)
     if done is None:
         x, size = out[:, cut[0]], out[:, -1]
-        forces = x @ program.maps[0].T if len(program.maps) == 1 else (program.maps @ x[..., None])[..., 0]
+        one = len(program.maps) == 1  # einsum for the reason given in `force_program`
+        forces = np.einsum("nj,ij->ni", x, program.maps[0]) if one else (program.maps @ x[..., None])[..., 0]
         forces *= np.where(codes == kernel.OPTIMAL, size, 0.0)[:, None]
         scale = program.factor * size**program.power
         residual = np.maximum(out[:, e + 3], out[:, e + 4])

@@ -48,7 +48,7 @@ PRIMAL, DUAL, ERROR_P, ERROR_D, WORST, MU, BY, CX, PROOF, RAY, RG, QUAD, STATE =
 """The state of a problem, the four figures of its best iterate, and what `_measure` finds."""
 
 
-@kernel
+@kernel(borrow=True)
 def _fetch(lane, columns, right, wrench, cones, slack, floor, begin, warm, A, V_, R, K):  # type: ignore[no-untyped-def]
     """Put a problem in a place: its right-hand side in units of its size, and where it starts."""
     n, rows = A.shape[0], A.shape[1]
@@ -162,7 +162,7 @@ def _keep(V_, R, K, best):  # type: ignore[no-untyped-def]
         store(K, KEPT + r, where(better, load(K, PRIMAL + r), load(K, KEPT + r)))
 
 
-@kernel
+@kernel(borrow=True)
 def _verdict(lane, limit, K):  # type: ignore[no-untyped-def]
     """The status of a place, −1 while it is open."""
     if not K[SIZE, lane] < np.inf:
@@ -181,7 +181,7 @@ def _verdict(lane, limit, K):  # type: ignore[no-untyped-def]
     return -1
 
 
-@kernel
+@kernel(borrow=True)
 def _give(lane, code, A, slack, V_, R, K, best, out):  # type: ignore[no-untyped-def]
     """Write the answer of a place; x is put back onto the balance rows, which are orthonormal, to the last digits."""
     n, rows = V_.shape[1], R.shape[1]
@@ -211,7 +211,7 @@ def _give(lane, code, A, slack, V_, R, K, best, out):  # type: ignore[no-untyped
     out[m], out[m + 5], out[m + 6] = code, K[STEPS, lane], 1.0 if nothing else K[SIZE, lane]
 
 
-@kernel
+@kernel(borrow=True)
 def _direction(phase, rest, A, L, S, V_, R, cones):  # type: ignore[no-untyped-def]
     """Solve ``(1 + WQW) u − Âᵀ y = −d`` with ``Â u = b`` (phase 0) or ``−rest rp``; what the last row makes of it."""
     if L.shape[0] > 0:
@@ -328,28 +328,33 @@ def _move(alpha, tau, kappa, V_, R, K):  # type: ignore[no-untyped-def]
         store2(R, Y, r, where(good, scale * (a + alpha * load2(R, DY, r)), a))
 
 
-@kernel
-def solve(columns, right, wrench, cones, slack, floor, begin, warm, chain, limit, out):  # type: ignore[no-untyped-def]
-    """Solve N problems into ``out (N, 2 n + rows + EXTRAS)``: x, y, z and what follows them.
-
-    ``columns (N, n, rows + 2)``: of A, c and Q; ``right (N, rows, 1 + p)``, ``wrench (N, p)``: ``b = right (1, wrench)``;
-    axes of length 1 are shared. *cones*: odd sizes. ``slack (rows,)``: kinds of rows; b is counted in units of the
-    norm of its balance rows, at least *floor*, and the row of a limit in units of the limit where that is larger.
-    With *warm* > 0 problems start from earlier answers ``begin (N, …)``, moved by that share towards the middle of the
-    cones, or, if *chain*, from their predecessors. For INFEASIBLE, y and z are the certificate ``Aᵀ y + z = 0``,
-    ``bᵀ y = 1``; for UNBOUNDED, x is a ray with ``A x = 0``, ``cᵀ x = −1``.
-    """
-    n, rows, count = columns.shape[1], right.shape[1], out.shape[0]
-    widest, curved = 1, False
-    for i in range(cones.shape[0]):
-        widest = max(widest, cones[i])
-    for p in range(columns.shape[0]):
-        for j in range(n):
-            curved |= columns[p, j, rows + 1] != 0.0
-    A, Ah, S = np.zeros((n, rows, WIDTH)), np.empty((n, rows, WIDTH)), np.empty((rows, rows, WIDTH))
-    W, L = np.empty((widest, widest, WIDTH)), np.empty((n if curved else 0, widest, WIDTH))
-    V_, R, K, best = np.ones((VECTORS, n, WIDTH)), np.ones((SHORTS, rows, WIDTH)), np.ones((STATE, WIDTH)), np.zeros((2 * n + rows, WIDTH))  # fmt: skip
-    problem, last = np.full(WIDTH, -1), np.zeros(WIDTH, np.int64)
+@kernel(borrow=True)
+def _run(
+    columns,
+    right,
+    wrench,
+    cones,
+    slack,
+    floor,
+    begin,
+    warm,
+    chain,
+    limit,
+    out,
+    A,
+    Ah,
+    S,
+    W,
+    L,
+    V_,
+    R,
+    K,
+    best,
+    problem,
+    last,
+):  # type: ignore[no-untyped-def]
+    """The work of `solve` in its scratch: eight places, each of which takes the next problem when its own is done."""
+    count = out.shape[0]
     stride = (count + WIDTH - 1) // WIDTH if chain else 1
     following = 0
     for lane in range(WIDTH):
@@ -382,3 +387,31 @@ def solve(columns, right, wrench, cones, slack, floor, begin, warm, chain, limit
         if left > 0:
             _measure(A, V_, R, K, cones.shape[0] + 1.0)
             _keep(V_, R, K, best)
+
+
+@kernel
+def solve(columns, right, wrench, cones, slack, floor, begin, warm, chain, limit, out):  # type: ignore[no-untyped-def]
+    """Solve N problems into ``out (N, 2 n + rows + EXTRAS)``: x, y, z and what follows them.
+
+    ``columns (N, n, rows + 2)``: of A, c and Q; ``right (N, rows, 1 + p)``, ``wrench (N, p)``: ``b = right (1, wrench)``;
+    axes of length 1 are shared. *cones*: odd sizes. ``slack (rows,)``: kinds of rows; b is counted in units of the
+    norm of its balance rows, at least *floor*, and the row of a limit in units of the limit where that is larger.
+    With *warm* > 0 problems start from earlier answers ``begin (N, …)``, moved by that share towards the middle of the
+    cones, or, if *chain*, from their predecessors. For INFEASIBLE, y and z are the certificate ``Aᵀ y + z = 0``,
+    ``bᵀ y = 1``; for UNBOUNDED, x is a ray with ``A x = 0``, ``cᵀ x = −1``.
+    """
+    n, rows = columns.shape[1], right.shape[1]
+    widest, curved = 1, False
+    for i in range(cones.shape[0]):
+        widest = max(widest, cones[i])
+    for p in range(columns.shape[0]):
+        for j in range(n):
+            curved |= columns[p, j, rows + 1] != 0.0
+    A, Ah, S = np.zeros((n, rows, WIDTH)), np.empty((n, rows, WIDTH)), np.empty((rows, rows, WIDTH))
+    W, L = np.empty((widest, widest, WIDTH)), np.empty((n if curved else 0, widest, WIDTH))
+    V_, R, K, best = np.ones((VECTORS, n, WIDTH)), np.ones((SHORTS, rows, WIDTH)), np.ones((STATE, WIDTH)), np.zeros((2 * n + rows, WIDTH))  # fmt: skip
+    problem, last = np.full(WIDTH, -1), np.zeros(WIDTH, np.int64)
+    _run(
+        columns, right, wrench, cones, slack, floor, begin, warm, chain, limit, out, A, Ah, S, W, L, V_, R, K, best, problem,
+        last,
+    )  # fmt: skip

@@ -58,7 +58,7 @@ def scaling(V, cones, x, z):  # type: ignore[no-untyped-def]
         s = end
 
 
-@kernel
+@kernel(borrow=True)
 def apply(V, cones, sign, v, out):  # type: ignore[no-untyped-def]
     """``W v`` (sign +1) or ``W⁻¹ v`` (sign −1)."""
     s = 0
@@ -127,7 +127,7 @@ def quotient(V, cones, a, b, minus, out):  # type: ignore[no-untyped-def]
         s = end
 
 
-@kernel
+@kernel(borrow=True)
 def room(V, cones, d, e):  # type: ignore[no-untyped-def]
     """The inverse of the largest α with ``λ + α d`` and ``λ + α e`` in the cones, at least 0."""
     worst, s = wide(0.0), 0
@@ -153,7 +153,7 @@ def room(V, cones, d, e):  # type: ignore[no-untyped-def]
     return worst
 
 
-@kernel
+@kernel(borrow=True)
 def quadratic(V, cones, Q, W, L, A):  # type: ignore[no-untyped-def]
     """Factors ``L Lᵀ = 1 + W diag(Q) W`` of each cone's block, and ``L⁻¹`` applied to the columns' blocks of A."""
     s = 0
@@ -185,7 +185,7 @@ def quadratic(V, cones, Q, W, L, A):  # type: ignore[no-untyped-def]
         s += k
 
 
-@kernel
+@kernel(borrow=True)
 def triangular(V, cones, L, v, transposed):  # type: ignore[no-untyped-def]
     """``L⁻¹ v``, or ``L⁻ᵀ v``, block by block, in place."""
     s = 0

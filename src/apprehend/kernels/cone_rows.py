@@ -10,7 +10,7 @@ from ._jit import kernel
 from .wide import load2, root, store2, where, wide
 
 
-@kernel
+@kernel(borrow=True)
 def spread(A, rows, y, columns, out):  # type: ignore[no-untyped-def]
     """``columns[out] = Aᵀ rows[y]``, one entry for each column."""
     for r in range(0, A.shape[1], 3):
@@ -21,7 +21,7 @@ def spread(A, rows, y, columns, out):  # type: ignore[no-untyped-def]
             store2(columns, out, j, before + t)
 
 
-@kernel
+@kernel(borrow=True)
 def gather(A, columns, x, rows, out):  # type: ignore[no-untyped-def]
     """``rows[out] = A columns[x]``, one entry for each row."""
     for r in range(0, A.shape[1], 3):
@@ -68,7 +68,7 @@ def gram(A, S):  # type: ignore[no-untyped-def]
             store2(S, r + 2, q + 2, s22)
 
 
-@kernel
+@kernel(borrow=True)
 def factor(S, at, n):  # type: ignore[no-untyped-def]
     """Cholesky factor in place of the n rows from *at* on (lower part); the diagonal holds reciprocals.
 
@@ -89,7 +89,7 @@ def factor(S, at, n):  # type: ignore[no-untyped-def]
             store2(S, at + i, j, t * inverse)
 
 
-@kernel
+@kernel(borrow=True)
 def forward(S, at, n, v, k):  # type: ignore[no-untyped-def]
     """``L⁻¹ v[k]`` in place, for the n entries from *at* on."""
     for j in range(n):
@@ -99,7 +99,7 @@ def forward(S, at, n, v, k):  # type: ignore[no-untyped-def]
         store2(v, k, at + j, t * load2(S, at + j, j))
 
 
-@kernel
+@kernel(borrow=True)
 def backward(S, at, n, v, k):  # type: ignore[no-untyped-def]
     """``L⁻ᵀ v[k]`` in place, for the n entries from *at* on."""
     for back in range(n):
