@@ -330,29 +330,9 @@ def _move(alpha, tau, kappa, V_, R, K):  # type: ignore[no-untyped-def]
 
 @kernel(borrow=True)
 def _run(
-    columns,
-    right,
-    wrench,
-    cones,
-    slack,
-    floor,
-    begin,
-    warm,
-    chain,
-    limit,
-    out,
-    A,
-    Ah,
-    S,
-    W,
-    L,
-    V_,
-    R,
-    K,
-    best,
-    problem,
+    columns, right, wrench, cones, slack, floor, begin, warm, chain, limit, out, A, Ah, S, W, L, V_, R, K, best, problem,
     last,
-):  # type: ignore[no-untyped-def]
+):  # type: ignore[no-untyped-def]  # fmt: skip
     """The work of `solve` in its scratch: eight places, each of which takes the next problem when its own is done."""
     count = out.shape[0]
     stride = (count + WIDTH - 1) // WIDTH if chain else 1
