@@ -1,6 +1,7 @@
 """Paths that are free of collision, with constraints where wanted, and straight lines of a tool."""
 
-from .constraints import Constraints, Inside, PathConstraint, Turned, Upright
+from .constraints import Inside, PathConstraint, Turned, Upright
+from .keeping import Constraints
 from .plan import plan
 from .result import PlanResult, PlanStatus
 from .search import shortcut

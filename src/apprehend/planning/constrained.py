@@ -1,4 +1,4 @@
-"""Trees that grow on a constraint: every new configuration is moved onto it (CBiRRT2, Berenson et al. 2011)."""
+"""Trees that grow on a constraint, and ways on it that are shorter: what the kernels of `constrain_plan` work on."""
 
 from __future__ import annotations
 
@@ -8,144 +8,94 @@ import numpy as np
 
 from ..arrays import Array
 from ..collision import CollisionModel
-from .constraints import Constraints
+from ..kernels import collide_plan, constrain_plan
+from .keeping import Constraints
 
-STRIDE = 0.2
-"""Largest step before it is moved onto the constraint, in rad (and m)."""
+STRIDE, LEAST = 0.5, 0.03
+"""Longest and shortest step before it is moved onto the constraint, in rad (and m)."""
 
-LEAD = 1.0 / 16.0
-"""Share of the slack that the ends of a path need: they are given, and may lie near the bound."""
+FIRST_ROOM = 512
+"""Nodes that a tree has room for at first."""
 
-DIRECT = 0.75
-"""A step on the constraint must bring the tree nearer to where it goes, by 1 − this share of the stride."""
-
-
-class Tree:
-    """Configurations with parents; the first are roots."""
-
-    def __init__(self, roots: Array) -> None:
-        self.nodes = np.array(roots)
-        self.parent = [-1] * len(roots)
-        self.count = len(roots)
-        self.lead: dict[int, Array] = {}
-
-    def nearest(self, q: Array) -> int:
-        """The nearest node."""
-        return int(((self.nodes[: self.count] - q) ** 2).sum(axis=1).argmin())
-
-    def add(self, q: Array, parent: int) -> int:
-        """One more node."""
-        if self.count == len(self.nodes):
-            self.nodes = np.concatenate([self.nodes, np.empty_like(self.nodes), np.empty((64, len(q)))])
-        self.nodes[self.count] = q
-        self.parent.append(parent)
-        self.count += 1
-        return self.count - 1
-
-    def way(self, node: int) -> tuple[Array, int]:
-        """From *node* to its root, and the number of the root."""
-        rows = [node]
-        while self.parent[rows[-1]] >= 0:
-            rows.append(self.parent[rows[-1]])
-        return self.nodes[rows], rows[-1]
+PORTION = 64
+"""Random configurations between looks at the clock."""
 
 
 class ConstrainedSearch:
     """Two trees between the start and the goals, all of whose motions keep the constraints and are free."""
 
-    def __init__(self, model: CollisionModel, keep: Constraints, start: Array, goals: Array, low: Array, high: Array):
-        self.model, self.keep, self.low, self.high = model, keep, low, high
-        self.trees = Tree(start[None]), Tree(goals)
+    def __init__(
+        self, model: CollisionModel, keep: Constraints, start: Array, goals: Array, low: Array, high: Array, most: int
+    ):
+        self.low, self.high, self.most = low, high, max(most, 2 * len(goals) + 2)
+        scale = np.array([STRIDE, LEAST, model.clearance, model.resolution])
+        self.task = constrain_plan.Task(model.compiled, model.lanes, keep.compiled, low, high, scale)
+        room = min(self.most, max(FIRST_ROOM, 4 * len(goals)))
+        self.nodes = np.empty((2, room, len(start)))
+        self.parent = np.full((2, room), -1, np.int64)
+        self.count = np.zeros(2, np.int64)
+        self.tally = np.zeros(3, np.int64)
         self.samples = 0
-        self._enter(self.trees[0], start[None])
-        self._enter(self.trees[1], goals)
+        self.compiling = 0.0  # seconds that went into compiling the kernels, in the first run of their kind
+        for k, roots in enumerate((start[None], goals)):
+            self.nodes[k, : len(roots)] = roots
+            self.count[k] = len(roots)
+            self._enter(model, keep, k, roots)
 
-    @property
-    def nodes(self) -> tuple[int, int]:
-        """Sizes of the trees."""
-        return self.trees[0].count, self.trees[1].count
-
-    def passes(self, qa: Array, qb: Array, share: float = 1.0) -> bool:
-        """Whether a straight motion keeps the constraints and is free."""
-        held = self.keep.hold(qa[None], qb[None], share)[0]
-        return bool(held and self.model.edges_free(qa, qb))
-
-    def _enter(self, tree: Tree, roots: Array) -> None:
+    def _enter(self, model: CollisionModel, keep: Constraints, k: int, roots: Array) -> None:
         """From roots that lie near a bound, first a motion away from it."""
-        inner, good = self.keep.project(roots, self.low, self.high)
-        for k, (root, q) in enumerate(zip(roots, inner, strict=True)):
-            if good[k] and np.abs(q - root).max() > 0.0 and self.passes(root, q, LEAD):
-                tree.add(q, k)
+        inner, good = keep.project(roots, self.low, self.high)
+        moved = np.flatnonzero(good & (inner != roots).any(axis=1))
+        moved = moved[keep.hold(roots[moved], inner[moved])]
+        for row in moved[model.edges_free(roots[moved], inner[moved])] if len(moved) else ():
+            self.nodes[k, self.count[k]] = inner[row]
+            self.parent[k, self.count[k]] = row
+            self.count[k] += 1
 
-    def reach(self, tree: Tree, row: int, goal: Array) -> tuple[int, bool]:
-        """Grow *tree* from a node towards *goal*, step by step on the constraint; the last node, whether it arrived."""
-        while True:
-            q = tree.nodes[row]
-            way = goal - q
-            far = float(np.linalg.norm(way))
-            if far <= STRIDE:
-                if far == 0.0:
-                    return row, True
-                if self.passes(q, goal) or (far < STRIDE and self.passes(q, goal, LEAD)):
-                    return tree.add(goal, row), True
-                return row, False
-            step, good = self.keep.project((q + (STRIDE / far) * way)[None], self.low, self.high)
-            moved = step[0]
-            nearer = float(np.linalg.norm(goal - moved)) <= far - (1.0 - DIRECT) * STRIDE
-            if not good[0] or not nearer or np.linalg.norm(moved - q) > 2.0 * STRIDE or not self.passes(q, moved):
-                return row, False
-            row = tree.add(moved, row)
-
-    def solve(self, rng: np.random.Generator, until: float, max_nodes: int) -> tuple[Array, int] | None:
+    def solve(self, rng: np.random.Generator, until: float) -> tuple[Array, int] | None:
         """A path and the number of its goal, or None when the time is over or the trees are full."""
-        first = True
-        while time.perf_counter() < until and max(self.nodes) < max_nodes:
-            one = 0 if self.nodes[0] <= self.nodes[1] else 1
-            mine, theirs = self.trees[one], self.trees[1 - one]
-            if first:  # straight towards the other tree
-                row, target, first = 0, theirs.nodes[theirs.nearest(mine.nodes[0])], False
-            else:
-                self.samples += 1
-                target = rng.uniform(self.low, self.high)
-                row = mine.nearest(target)
-            row, _ = self.reach(mine, row, target)
-            met, reached = self.reach(theirs, theirs.nearest(mine.nodes[row]), mine.nodes[row].copy())
-            if reached:
-                halves = [mine.way(row), theirs.way(met)]
-                if one == 1:
-                    halves.reverse()
+        near = int(((self.nodes[1, : self.count[1]] - self.nodes[0, 0]) ** 2).sum(axis=1).argmin())
+        samples = self.nodes[1, near][None].copy()  # the first way is that towards the nearest goal
+        while True:
+            began, known = time.perf_counter(), len(constrain_plan.grow.overloads)
+            status, used, *ends = constrain_plan.grow(
+                self.task, self.nodes, self.parent, self.count, samples, self.tally
+            )
+            if len(constrain_plan.grow.overloads) > known:
+                self.compiling += time.perf_counter() - began
+            self.samples += int(used)
+            if status == collide_plan.CONNECTED:
+                halves = [self._way(k, int(ends[k])) for k in (0, 1)]
                 (a, _), (b, root) = halves
                 return np.concatenate([a[::-1], b[1:]]), root
-        return None
+            full = status == collide_plan.FULL
+            if full and self.nodes.shape[1] < self.most:
+                self._make_room()
+            elif full or time.perf_counter() - self.compiling > until:
+                return None
+            samples = rng.uniform(self.low, self.high, (PORTION, len(self.low)))
 
-    def shorten(self, path: Array, rng: np.random.Generator, tries: int, until: float) -> Array:
-        """Random ways through, grown on the constraint, where they are shorter than what they replace."""
-        for _ in range(tries):
-            if len(path) < 3 or time.perf_counter() > until:
-                break
-            i, k = sorted(rng.integers(0, len(path), 2).tolist())
-            if k - i < 2:
-                continue
-            tree = Tree(path[i][None])
-            row, reached = self.reach(tree, 0, path[k])
-            if not reached:
-                continue
-            way = tree.way(row)[0][::-1]
-            if _length(way) < _length(path[i : k + 1]) - 1e-6:
-                path = np.concatenate([path[:i], way, path[k + 1 :]])
-        return self.thin(path)
+    @property
+    def full(self) -> bool:
+        """Whether there is no room for more nodes."""
+        return bool(self.count.max() >= self.most)
 
-    def thin(self, path: Array) -> Array:
-        """Fewer vertices: those that a straight motion on the constraint can pass by go."""
-        kept, i = [0], 0
-        while i < len(path) - 1:
-            k = min(len(path) - 1, i + 8)
-            while k > i + 1 and not self.passes(path[i], path[k]):
-                k -= 1
-            kept.append(k)
-            i = k
-        return path[kept]
+    def _way(self, k: int, row: int) -> tuple[Array, int]:
+        rows = [row]
+        while self.parent[k, rows[-1]] >= 0:
+            rows.append(int(self.parent[k, rows[-1]]))
+        return self.nodes[k, rows], rows[-1]
 
+    def _make_room(self) -> None:
+        old = self.nodes.shape[1]
+        room = min(4 * old, self.most)
+        nodes, parent = np.empty((2, room, self.nodes.shape[2])), np.full((2, room), -1, np.int64)
+        nodes[:, :old], parent[:, :old] = self.nodes, self.parent
+        self.nodes, self.parent = nodes, parent
 
-def _length(path: Array) -> float:
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+    def shorten(self, path: Array, rng: np.random.Generator, tries: int) -> Array:
+        """Random ways on the constraint, where they are shorter than what they replace."""
+        room = np.empty((4 * len(path) + 64, path.shape[1]))
+        room[: len(path)] = path
+        count = constrain_plan.shorten(self.task, room, len(path), rng.uniform(size=(tries, 2)), self.tally)
+        return room[:count].copy()

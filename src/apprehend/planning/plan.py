@@ -15,8 +15,9 @@ from ..collision import CollisionModel, Touch
 from ..errors import InputError
 from ..kernels import collide_plan
 from ..kinematics import Robot
-from .constrained import LEAD, ConstrainedSearch
-from .constraints import Constraints, PathConstraint
+from .constrained import ConstrainedSearch
+from .constraints import PathConstraint
+from .keeping import Constraints
 from .result import PlanResult, PlanStatus
 from .search import SHORTCUTS, Search, first_direct, shortcut
 from .smoothing import smooth as smoothed
@@ -148,7 +149,7 @@ def _direct(model: CollisionModel, task: _Task, keep: Constraints | None) -> int
     near = np.argsort(((task.goals[task.usable] - task.start) ** 2).sum(axis=1), kind="stable")
     order = task.usable[near]
     if keep is not None:
-        order = order[keep.hold(np.repeat(task.start[None], len(order), axis=0), task.goals[order], LEAD)]
+        order = order[keep.hold(np.repeat(task.start[None], len(order), axis=0), task.goals[order])]
     return first_direct(model, task.start, task.goals, order)
 
 
@@ -176,15 +177,16 @@ def _on_constraints(
     max_nodes: int, simplify: bool,
 ) -> PlanResult:  # fmt: skip
     """The same on constraints."""
-    search = ConstrainedSearch(model, keep, task.start, task.goals[task.usable], task.low, task.high)
-    found = search.solve(rng, until, max_nodes)
-    nodes, samples = search.nodes, search.samples
+    goals = task.goals[task.usable]
+    search = ConstrainedSearch(model, keep, task.start, goals, task.low, task.high, max_nodes)
+    found = search.solve(rng, until)
+    a, b = (int(count) for count in search.count)
     if found is None:
-        return _spent(max(nodes) >= max_nodes, began, samples, nodes, task)
+        return _spent(search.full, began, search.samples, (a, b), task)
     path, root = found
     if simplify:
-        path = search.shorten(path, rng, SHORTCUTS, until)
-    return PlanResult(PlanStatus.SUCCESS, path, int(task.usable[root]), nodes=sum(nodes), samples=samples)
+        path = search.shorten(path, rng, SHORTCUTS)
+    return PlanResult(PlanStatus.SUCCESS, path, int(task.usable[root]), nodes=a + b, samples=search.samples)
 
 
 def _spent(full: bool, began: float, samples: int, nodes: tuple[int, int], task: _Task) -> PlanResult:

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, as_shaped
 from ..collision import CollisionModel
 from ..errors import InputError
-from .constraints import Constraints, PathConstraint
+from .constraints import PathConstraint
+from .keeping import Constraints
 
 ROUNDS = 4
 """Subdivisions: corners become arcs of up to 2⁴ chords."""
