@@ -18,6 +18,7 @@ from ..arrays import Array, as_pose, as_vector
 from ..conventions import GRAVITY
 from ..errors import InputError, unknown_name
 from ..kinematics import Robot
+from ..kinematics.mounting import mounting
 from ..robots.description import Description, JointType
 from .geometry import Geometry
 from .obstacles import as_geometry
@@ -38,14 +39,17 @@ class RobotSource:
 
     arm: str
     hand: str | None = None
-    at: str | None = None  # the arm's link that carries the hand; None: the end of the arm
-    mount: Array = field(default_factory=lambda: np.eye(4))  # T_at_handroot
+    at: str | None = None  # the arm's link that carries the hand; None: where its own sits, else the end of the arm
+    mount: Array | None = None  # T_at_handroot; None: as `mounting` finds it
     base: Array = field(default_factory=lambda: np.eye(4))  # T_world_base
     prefix: str | None = None  # before the names of the hand; None: "" where no name occurs twice, else "hand_"
     within: str | None = None  # *arm* is a MuJoCo model of a whole scene; this body of it, or "": the one that moves
 
     def build(self) -> tuple[Robot, str | None]:
-        """The placed robot with its hand, and the name of the hand's root link (None: no hand was attached)."""
+        """The placed robot with its hand, and the name of the hand's root link (None: no hand was attached).
+
+        A hand takes the place of the arm's own.
+        """
         if self.within is None:
             arm = Robot.load(self.arm)
         else:
@@ -55,7 +59,10 @@ class RobotSource:
         if self.hand is None:
             return arm.placed(self.base), None
         hand = Robot.load(self.hand)
-        at = self.at or arm.description.tool or end_link(arm.description)
+        at, flange = self.at, np.eye(4)
+        if at is None and arm.description.hand in arm.description.parent_joint:
+            arm, at, flange = _bare(arm)
+        at = at or arm.description.tool or end_link(arm.description)
         if at not in arm.frame_names:
             unknown_name("link", at, arm.frame_names, f"robot {arm.name!r} (to carry {self.hand!r})")
         prefix = self.prefix
@@ -63,8 +70,19 @@ class RobotSource:
             taken = {*arm.frame_names, *(joint.name for joint in arm.description.joints)}
             names = {*hand.frame_names, *(joint.name for joint in hand.description.joints)}
             prefix = "hand_" if taken & names else ""
-        robot = arm.attach(hand, at, self.mount, prefix).placed(self.base)
+        mount = flange @ mounting(hand) if self.mount is None else self.mount
+        robot = arm.attach(hand, at, mount, prefix).placed(self.base)
         return robot, prefix + hand.description.root
+
+
+def _bare(arm: Robot) -> tuple[Robot, str, Array]:
+    """*arm* without its own hand, the link that carried it, and the flange on that link, its z axis outwards."""
+    from ..robots import subtree, without
+
+    description = arm.description
+    joint = description.parent_joint[description.hand]
+    own = Robot(subtree(description, description.hand))
+    return Robot(without(description, description.hand)), joint.parent, joint.pose @ np.linalg.inv(mounting(own))
 
 
 @dataclass(frozen=True, eq=False)

@@ -177,7 +177,7 @@ def _robot(table: Table, folder: Path) -> RobotSource:
         arm=_beside(folder, table.need_text("arm")),
         hand=None if hand is None else _beside(folder, hand),
         at=table.text("at"),
-        mount=table.pose("mount") if "mount" in table else np.eye(4),
+        mount=table.pose("mount") if "mount" in table else None,
         base=table.pose("base") if "base" in table else np.eye(4),
         prefix=prefix,
         within=_text_or_empty(table, "within"),
@@ -314,7 +314,7 @@ def save(scene: Scene, path: Path) -> Path:
         lines.append(f"hand = {quoted(source.hand)}")
         lines += [f"at = {quoted(source.at)}"] * (source.at is not None)
         lines += [f"prefix = {quoted(source.prefix)}"] * (source.prefix is not None)
-        lines.append(f"mount = {pose_text(source.mount)}")
+        lines += [f"mount = {pose_text(source.mount)}"] if source.mount is not None else []
     lines.append(f"base = {pose_text(source.base)}")
     for box in scene.boxes:
         lines += [

@@ -73,6 +73,8 @@ class Fingers:
         self.tips = tuple(f.tip for f in hand.fingers)
         self._arrays = _packed(self.shapes)
         self._offsets = np.stack([s.pose for s in self.shapes])
+        self.halves = np.array([s.half for s in self.shapes])
+        """Half the edges ``(S, 3)`` of a box around each shape in its own axes."""
 
     @cached_property
     def moves(self) -> BoolArray:

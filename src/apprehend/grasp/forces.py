@@ -43,6 +43,7 @@ _CODES = {
     kernel.OPTIMAL: ForceStatus.OPTIMAL, kernel.INFEASIBLE: ForceStatus.INFEASIBLE,
     kernel.UNBOUNDED: ForceStatus.UNBOUNDED, kernel.INACCURATE: ForceStatus.INACCURATE,
 }  # fmt: skip
+_OBJECTS = np.array([_CODES[code] for code in range(len(_CODES))], dtype=object)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +139,7 @@ class ContactForces(Result):
 
 
 @dataclass(frozen=True, eq=False)
-class ForceBatch:
+class ForceBatch(Result):
     """Forces for N wrenches: ``forces (N, m)``, ``value``, ``bound``, ``residual (N,)``, ``certificate (N, p)``."""
 
     forces: Array
@@ -153,7 +154,7 @@ class ForceBatch:
         return len(self.codes)
 
     @property
-    def success(self) -> BoolArray:
+    def success(self) -> BoolArray:  # type: ignore[override]
         """Which are optimal ``(N,)``."""
         ok: BoolArray = self.codes == kernel.OPTIMAL
         return ok
@@ -163,9 +164,19 @@ class ForceBatch:
         for mine, other in zip(vars(self).values(), vars(one).values(), strict=True):
             mine[i] = other[0]
 
-    def status(self, i: int | tuple[int, ...]) -> ForceStatus:
-        """The outcome of wrench *i*."""
-        return _CODES[int(self.codes[i])]
+    @property
+    def status(self) -> Any:  # type: ignore[override]
+        """`ForceStatus` of every wrench, an object array ``(...)``."""
+        return _OBJECTS[self.codes]
+
+    def explain(self) -> str:
+        """How many wrenches are balanced, and the reason of the first that is not."""
+        good = self.success
+        text = f"forces for {int(good.sum())} of {good.size} wrenches"
+        if good.all():
+            return text
+        first = tuple(int(i) for i in np.argwhere(~good)[0])
+        return f"{text}; wrench {first if len(first) > 1 else first[0]}: {self.status[first].value}"
 
 
 def contact_forces(

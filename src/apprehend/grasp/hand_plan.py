@@ -24,7 +24,7 @@ from .surface import Surface
 BATCH = 96
 """Hands that are placed at once."""
 PLACES = 16000
-"""Placements of pre-grasps from which the inverse way chooses its contacts."""
+"""Placements of pre-grasps from which the inverse way chooses its contacts; of thrice as many if not all are wanted."""
 REACH = 0.06
 """A pad may go this far forwards or back to its contact, in m."""
 EASY = 0.02
@@ -37,6 +37,16 @@ OPEN = 0.035
 """A pre-grasp with its pads drawn back by that much must have room where it is placed, in m."""
 CLEARANCE = 1e-3
 """An open hand keeps this distance from the body, in m."""
+OPENINGS = (0.06, 0.05, 0.04, 0.03, 0.02, 0.012)
+"""How far the pads are drawn back for the approach, in m: the first that leaves room all the way, or leaves most."""
+WAY = 9
+"""Places of the approach at which the open hand is checked."""
+FROM_BELOW = 0.35
+"""Sine of the angle from below a table at which no hand comes."""
+SIDEWAYS = np.radians(30.0)
+"""The approach of a grasp differs from that of its pre-grasp by up to about this angle."""
+SPARE = 6
+"""Times as many placements are drawn by the other way where most of them are not wanted."""
 BACK = (0.01, 0.02, 0.035, 0.055, 0.08)
 """Pads are drawn back by the first of these that gives room before they close on a planned contact, in m."""
 WRENCHES = np.concatenate([np.eye(3), -np.eye(3)])
@@ -78,7 +88,8 @@ class HandSearch:
             "no contacts that close lie before the pads": PlanStatus.NO_CLOSURE,
             "out of the fingers' reach": PlanStatus.OUT_OF_REACH,
             "comes from another side than asked for": PlanStatus.NO_APPROACH,
-            "no room for the open hand": PlanStatus.NO_ROOM, "hits the table": PlanStatus.NO_ROOM,
+            "no room for the open hand": PlanStatus.NO_ROOM, "no way in for the open hand": PlanStatus.NO_ROOM,
+            "hits the table": PlanStatus.NO_ROOM,
             "too few contacts": PlanStatus.TOO_FEW, "no force closure": PlanStatus.NO_CLOSURE,
             "too weak": PlanStatus.TOO_WEAK,
         }  # fmt: skip
@@ -175,6 +186,19 @@ class HandSearch:
         return hit, margin
 
     def _placed(self, count: int) -> tuple[IntArray, Array, Array]:
+        """At most *count* of the random placements of `_drawn`: open hands above the table, from where it is asked."""
+        table, wanted = self.settings.table, self.settings.approach
+        if not len(table) and wanted is None:
+            return self._drawn(count)
+        pick, pose, along = self._drawn((3 if count == PLACES else SPARE) * count)
+        good = (table[:, :3] @ along.T < FROM_BELOW).all(axis=0)
+        if wanted is not None:
+            good &= (wanted @ along.T).max(axis=0) > np.cos(min(self.settings.approach_tolerance + SIDEWAYS, np.pi))
+        keep = np.flatnonzero(good)
+        keep = keep[self._above(self.fingers.cages.q[pick[keep]], pose[keep])][:count]
+        return pick[keep], pose[keep], along[keep]
+
+    def _drawn(self, count: int) -> tuple[IntArray, Array, Array]:
         """Random placements: which pre-grasp, T_body_hand ``(N, 4, 4)`` with its focus in the body, and the approach.
 
         The approach is that of a point of the surface, more or less; the focus lies up to half the thickness behind it.
@@ -197,8 +221,11 @@ class HandSearch:
         fingers = self.fingers
         self.tried["closing"] += BATCH
         pick, pose, along = self._placed(BATCH)
+        if not len(pick):
+            self.rejected["hits the table"] += BATCH
+            return
         q, focus = fingers.cages.q[pick], fingers.cages.focus[pick]
-        room = np.zeros(BATCH, np.bool_)
+        room = np.zeros(len(pick), np.bool_)
         for back in np.linspace(0.0, 0.06, 9):  # the deepest place with room
             left = np.flatnonzero(~room)
             trial = pose[left].copy()
@@ -230,27 +257,47 @@ class HandSearch:
             return
         q, pose, targets = q[free], pose[free], targets[free]
         touching = close(self.fingers, self.surface, q, pose, targets)
+        above = self._above(touching.q, pose)
         for i in range(len(q)):
             if touching.distance[i].min() <= 0.0:
                 self.rejected["penetrates the body"] += 1
-            elif self._below(touching.q[i], pose[i]):
+            elif not above[i]:
                 self.rejected["hits the table"] += 1
             else:
-                self._judge(touching, i, q[i], pose[i], method)
+                self._judge(touching, i, pose[i], method)
 
-    def _below(self, q: Array, pose: Array) -> bool:
-        if not len(self.settings.table):
-            return False
-        poses = self.fingers.shape_poses(q[None], pose[None])[0]
-        for T, shape in zip(poses, self.fingers.shapes, strict=True):
-            corners = shape.points if len(shape.points) else _corners(shape.half)
-            world = corners @ T[:3, :3].T + T[:3, 3]
-            grown = shape.radius if len(shape.points) else 0.0
-            if (self.settings.table[:, :3] @ world.T - self.settings.table[:, 3:] < grown).any():
-                return True
-        return False
+    def _above(self, q: Array, pose: Array) -> BoolArray:
+        """Whether all shapes of hands keep out of the table, by their oriented boxes."""
+        fingers = self.fingers
+        out = np.ones(len(q), np.bool_)
+        for start in range(0, len(q), 2048):
+            part = slice(start, start + 2048)
+            poses = fingers.shape_poses(q[part], pose[part])
+            for n, d in zip(self.settings.table[:, :3], self.settings.table[:, 3], strict=True):
+                reach = np.abs(np.einsum("i,nsij->nsj", n, poses[..., :3, :3])) * fingers.halves
+                lowest = poses[..., :3, 3] @ n - reach.sum(axis=-1)
+                out[part] &= (lowest > d + self.settings.table_clearance).all(axis=1)
+        return out
 
-    def _judge(self, touching: Touching, i: int, before: Array, pose: Array, method: str) -> None:
+    def _way_in(self, q: Array, pose: Array, along: Array) -> Array | None:
+        """Joints of the open hand ``(n,)`` that comes along the unit vector *along* to close there, or None.
+
+        Its way is free of body and table, and the fingers of each other.
+        """
+        fingers, s = self.fingers, self.settings
+        opened = np.concatenate([retract(fingers, q[None], back) for back in OPENINGS])
+        opened = opened[fingers.own.free(opened)]
+        if not len(opened):
+            return None
+        way = np.tile(pose, (len(opened), WAY, 1, 1))
+        way[..., :3, 3] -= np.linspace(0.0, s.standoff, WAY)[:, None] * along
+        joints, poses = np.repeat(opened, WAY, axis=0), way.reshape(-1, 4, 4)
+        distance, _ = fingers.distances(self.surface, joints, poses, 1.5 * max(s.clearance, CLEARANCE))
+        room = np.where(self._above(joints, poses), distance.min(axis=1), 0.0).reshape(-1, WAY).min(axis=1)
+        best = int(np.argmax(np.minimum(room, s.clearance)))  # the first of those with enough
+        return opened[best].copy() if room[best] > CLEARANCE else None
+
+    def _judge(self, touching: Touching, i: int, pose: Array, method: str) -> None:
         s, body = self.settings, self.body
         contacts, links = contacts_of(self.fingers, touching, i, s.friction, body.torsional_friction)
         if len(contacts) < (2 if body.torsional_friction > 0.0 else 3):
@@ -274,6 +321,10 @@ class HandSearch:
         if force is None:
             self.rejected["too weak"] += 1
             return
+        before = self._way_in(q, pose, tcp[:3, 2])
+        if before is None:
+            self.rejected["no way in for the open hand"] += 1
+            return
         epsilon = grasp.quality(gap=0.05).lower
         margins = {
             "epsilon": epsilon,
@@ -287,7 +338,7 @@ class HandSearch:
         width = float(np.linalg.norm(points[:, None] - points[None], axis=-1).max())
         self.found.append(
             HandCandidate(
-                pose.copy(), tcp, width, width, contacts, epsilon, margins, force, q.copy(), before.copy(), links,
+                pose.copy(), tcp, width, width, contacts, epsilon, margins, force, q.copy(), before, links,
                 method, closure.internal_force,
             )
         )  # fmt: skip
@@ -354,8 +405,3 @@ def _coordinates(pose: Array, about: Array) -> Array:
     turns = [np.arctan2(R[:, 1, 0], R[:, 0, 0]), np.arcsin(np.clip(-R[:, 2, 0], -1.0, 1.0)),
              np.arctan2(R[:, 2, 1], R[:, 2, 2])]  # fmt: skip
     return np.concatenate([pose[:, :3, 3] - about, np.stack(turns, axis=1)], axis=1)
-
-
-def _corners(half: Array) -> Array:
-    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
-    return signs * half

@@ -24,6 +24,9 @@ class HandSettings:
     max_force: float
     approach: Array | None
     approach_tolerance: float
+    clearance: float
+    table_clearance: float
+    standoff: float
 
 
 def checked_hand(s: HandSettings, n: int) -> HandSettings:
@@ -35,8 +38,10 @@ def checked_hand(s: HandSettings, n: int) -> HandSettings:
         value = getattr(s, name)
         if not (np.isfinite(value) and value > 0.0):
             raise InputError(f"{name} is {value}; expected a finite number above zero")
-    if not (np.isfinite(s.acceleration) and s.acceleration >= 0.0):
-        raise InputError(f"acceleration is {s.acceleration}; expected zero or more")
+    for name in ("acceleration", "clearance", "table_clearance", "standoff"):
+        value = getattr(s, name)
+        if not (np.isfinite(value) and value >= 0.0):
+            raise InputError(f"{name} is {value}; expected zero or more")
     if not s.max_force > 0.0:
         raise InputError(f"max_force is {s.max_force}; expected a number above zero")
     return s

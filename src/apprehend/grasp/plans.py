@@ -44,13 +44,15 @@ def plan(
     (`ik.solve_frames` on a floating palm), draws the pads back, and closes; ``"closing"`` puts the place that the pads
     of a pre-grasp posture face into the body, comes from outside as far as there is room, and closes until contact.
     Closing stops by exact distances of the links' convex shapes from the mesh, at most 0.3 mm off it: no link
-    penetrates. Candidates are `HandCandidate`: joints, pre-grasp, one contact per link that touches, the internal
-    force that proves force closure; ``quality`` is the certified lower bound of ε (L1, exact cones, torques over the
-    body's radius), and ``margins`` hold it with ``closure``, ``contacts``, ``position`` (m that every contact may be
-    off), ``force`` (N), ``com_distance``, ``distance`` (of the nearest link, in m). The contact forces must hold weight
-    and acceleration within the efforts of the joints where they are known. *samples* are tries per way (480 if None);
-    *approach*, *table*, *friction*, *max_force*, *safety*, *acceleration* and *apart* mean the same for all hands, the
-    other options concern jaws.
+    penetrates. The open hand (`HandCandidate.pregrasp`, as wide as leaves room, *clearance* where it can be had) comes
+    from *standoff* back along the approach and meets neither body nor table. Candidates are `HandCandidate`: joints,
+    pre-grasp, one contact per link that touches, the internal force that proves force closure; ``quality`` is the
+    certified lower bound of ε (L1, exact cones, torques over the body's radius), and ``margins`` hold it with
+    ``closure``, ``contacts``, ``position`` (m that every contact may be off), ``force`` (N), ``com_distance``,
+    ``distance`` (of the nearest link, in m). The contact forces must hold weight and acceleration within the efforts of
+    the joints where they are known. *samples* are tries per way (480 if None); *approach*, *table*, *table_clearance*,
+    *friction*, *max_force*, *safety*, *acceleration* and *apart* mean the same for all hands, the other options concern
+    jaws.
 
     **Parallel jaws**: antipodal pairs of surface points (*samples*, 2000 if None) are found by ray casting on the mesh;
     each closing line is tried at *angles* approach directions around it and at several depths. A pose counts if the
@@ -83,7 +85,8 @@ def plan(
             body.friction if friction is None else float(friction),
             ("inverse", "closing") if method == "both" else (method,), 480 if samples is None else samples,
             half_spaces(table), acceleration, safety, apart, np.inf if max_force is None else float(max_force),
-            directions(approach), approach_tolerance,
+            directions(approach), approach_tolerance, clearance, table_clearance,
+            standoff,
         )  # fmt: skip
         from .hand_plan import HandSearch
 

@@ -31,6 +31,8 @@ ROTOR = 300.0  # rad/s², see `_rotor`
 MASSLESS = 1e-3  # kg, and the inertia of that at 1 cm, of a moving link that has no mass and carries none
 CARRIER = 1e-6  # kg of a moving link without mass that carries others, which have it
 MINIMUM = 1e-9  # what the engine takes as positive inertia
+ROUNDING = 1e-5  # relative, by which moments of inertia in a file may be rounded
+LOSSES = 0.1  # of a joint's effort, see `losses`
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,6 +174,7 @@ def _add_robot(spec: Any, robot: Robot, physics: Physics) -> list[str]:
         if joint.type is JointType.FIXED:
             continue
         _add_joint(body, joint, physics)
+        assumptions += [sentence] if (sentence := losses(joint)[2]) else []
         if not joint.armature and _rotor(joint):
             assumptions.append(f"joint {joint.name} states no rotor inertia; {_rotor(joint):.2g} kg m² are assumed")
         if joint.child in massive:
@@ -221,12 +224,15 @@ def physical(inertia: Array) -> tuple[Array, str | None]:
     moments, axes = np.linalg.eigh(0.5 * (inertia + inertia.T))
     least = max(MINIMUM, 1e-6 * float(moments[-1]))
     fixed = np.maximum(moments, least)
-    fixed[0] = max(fixed[0], fixed[2] - fixed[1])
+    fixed[0] = max(fixed[0], (1.0 + ROUNDING) * (fixed[2] - fixed[1]))
     if np.allclose(fixed, moments, rtol=1e-9, atol=0.0):
         return inertia, None
+    used_inertia = (axes * fixed) @ axes.T
+    if np.allclose(fixed, moments, rtol=0.0, atol=2.0 * ROUNDING * float(moments[-1])):
+        return used_inertia, None  # a flat body, to the digits of the file
     found = ", ".join(f"{m:.3g}" for m in moments)
     used = ", ".join(f"{m:.3g}" for m in fixed)
-    return (axes * fixed) @ axes.T, f"no body has the principal moments of inertia {found} kg m²; {used} are used"
+    return used_inertia, f"no body has the principal moments of inertia {found} kg m²; {used} are used"
 
 
 def _massive_groups(description: Description) -> tuple[set[str], set[str]]:
@@ -245,8 +251,7 @@ def _add_joint(body: Any, joint: Joint, physics: Physics) -> None:
     kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.type is JointType.PRISMATIC else mujoco.mjtJoint.mjJNT_HINGE
     made = body.add_joint(name=f"joint:{joint.name}", type=kind, axis=joint.axis)
     made.armature = joint.armature or _rotor(joint)
-    made.frictionloss = joint.friction
-    made.damping[0] = joint.damping
+    made.frictionloss, made.damping[0], _ = losses(joint)
     made.limited = mujoco.mjtLimited.mjLIMITED_FALSE
     lower, upper = joint.limits.lower, joint.limits.upper
     if joint.mimic is None and joint.type is not JointType.CONTINUOUS and np.isfinite([lower, upper]).all():
@@ -254,6 +259,31 @@ def _add_joint(body: Any, joint: Joint, physics: Physics) -> None:
         made.range = [lower, upper]
         made.solref_limit = [2.0 * physics.timestep, 1.0]
         made.solimp_limit = physics.joint_solimp
+
+
+def losses(joint: Joint) -> tuple[float, float, str | None]:
+    """Dry friction and damping of a joint, and a sentence where those of the file would stop its own drive.
+
+    A drive that moves its joint overcomes the friction, and the damping at the joint's largest velocity; numbers for
+    which the effort does not suffice are placeholders, and `LOSSES` of the effort stands for them.
+    """
+    effort, speed, friction, damping = joint.limits.effort, joint.limits.velocity, joint.friction, joint.damping
+    if not (np.isfinite(effort) and effort > 0.0):
+        return friction, damping, None
+    if friction >= effort:
+        friction = LOSSES * effort
+    if np.isfinite(speed) and speed > 0.0 and damping * speed >= effort:
+        damping = LOSSES * effort / speed
+    if (friction, damping) == (joint.friction, joint.damping):
+        return friction, damping, None
+    return (
+        friction,
+        damping,
+        (
+            f"joint {joint.name} could not move against its dry friction of {joint.friction:.3g} and damping of "
+            f"{joint.damping:.3g} with its effort of {effort:.3g}; {friction:.2g} and {damping:.2g} are assumed"
+        ),
+    )
 
 
 def _rotor(joint: Joint) -> float:
