@@ -155,7 +155,7 @@ def other_objectives(rng: np.random.Generator) -> None:
         "barrier",
     ):
         found = grasp.contact_forces(W, objective, limits)
-        assert {found.status(i) for i in range(len(W))} <= {ForceStatus.OPTIMAL, ForceStatus.INFEASIBLE}
+        assert set(found.status) <= {ForceStatus.OPTIMAL, ForceStatus.INFEASIBLE}
         contenders[objective] = (lambda o=objective: grasp.contact_forces(W, o, limits), len(W))
     timing = interleave(contenders, rounds=5)
     table("4 contacts, limits on 4 normal forces and 8 torques either way, batches of 200", timing, "min_normal")

@@ -7,7 +7,7 @@ enum whose values are one sentence each, so that a person can read ``print(resul
 from __future__ import annotations
 
 from enum import Enum
-from typing import Self
+from typing import Any, Self
 
 from .errors import UnsuccessfulError
 
@@ -34,7 +34,8 @@ class Result:
         return str(self.status.value)
 
     def require_success(self) -> Self:
-        """Return ``self``, or raise `UnsuccessfulError` with the explanation."""
-        if not self.success:
+        """Return ``self``, or raise `UnsuccessfulError` with the explanation; of a batch, all must have succeeded."""
+        good: Any = self.success
+        if not (good if isinstance(good, bool) else good.all()):
             raise UnsuccessfulError(self.explain())
         return self

@@ -94,7 +94,7 @@ def test_many_grasps_equal_each_grasp(model):
             contacts = [Contact(p[i, c], n[i, c], mu[i, c], model, gamma[i, c]) for c in range(k)]
             grasp = Grasp(contacts, reference=about[i], length=length[i])
             one = grasp.contact_forces(w[i], objective, limits)
-            assert found.status(i) is one.status
+            assert found.status[i] is one.status
             if one.success:
                 assert found.value[i] == pytest.approx(one.value, rel=1e-7)
                 np.testing.assert_allclose(grasp.matrix @ found.forces[i], -w[i], atol=1e-10)
@@ -107,7 +107,7 @@ def test_many_grasps_in_any_shape_and_wrong_ones():
     found = optimal_forces(p, -p, [0, 0, -10.0, 0, 0, 0], 0.5, "soft", 0.1)
     np.testing.assert_allclose(found.value, np.full((2, 3), 20.0), rtol=1e-8)
     assert found.forces.shape == (2, 3, 8)
-    assert found.status((1, 2)) is ForceStatus.OPTIMAL
+    assert found.status[1, 2] is ForceStatus.OPTIMAL
     with pytest.raises(InputError, match=r"wrenches have shape \(4, 6\); expected \(2, 3, 6\)"):
         optimal_forces(p, -p, np.ones((4, 6)))
     with pytest.raises(InputError, match="objective is 'barrier'"):

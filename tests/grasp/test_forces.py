@@ -154,7 +154,7 @@ def test_batches_equal_single_calls_and_scale():
     batch = grasp.contact_forces(W)
     for i in range(0, 40, 7):
         one = grasp.contact_forces(W[i])
-        assert batch.status(i) is one.status
+        assert batch.status[i] is one.status
         assert batch.value[i] == one.value
     np.testing.assert_allclose(grasp.contact_forces(1e4 * W).value, 1e4 * batch.value, rtol=1e-7)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -20,8 +21,9 @@ from ..kinematics import Robot
 from ..parallel import over_ranges
 from ..result import Result, Status
 from .chain import PreparedChain, prepare
+from .continua import self_motions, within_limits
 from .flat import flat_branches, flat_structure
-from .general import general_branches
+from .general import first_pair, general_branches
 from .structure import EXACT, Geometry, Structure, detect, idealised, lines, locked_geometry, revolute_only
 
 GRAIN = 256
@@ -40,6 +42,7 @@ class BranchStatus(Status):
 
 _STATUSES = tuple(BranchStatus)
 _OBJECTS = np.array(_STATUSES, dtype=object)
+LIMITS = _STATUSES.index(BranchStatus.LIMITS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +99,14 @@ class _Arm:
     structure: Structure | None  # of six joints, or of seven with one locked
     locked: int = -1  # the joint to lock, −1: none
     seven: Geometry | None = None  # all seven axes
+    general: Geometry | None = None  # six axes that fit no form, or seven with one locked somewhere
+
+    @cached_property
+    def pair(self) -> int:
+        """The first of the two joints that `general_branches` eliminates."""
+        assert self.general is not None
+        g = self.general
+        return first_pair(g.h, g.o, g.R0)
 
 
 _arms: WeakKeyDictionary[Robot, dict[str, _Arm]] = WeakKeyDictionary()
@@ -110,7 +121,8 @@ def _arm(robot: Robot, frame: str) -> _Arm:
         wide = chain.program._replace(lower=np.full(k, -np.inf), upper=np.full(k, np.inf))
         known[frame] = _Arm(chain, wide, None)
         if revolute_only(model) and k == 6:
-            known[frame] = _Arm(chain, wide, detect(lines(model)))
+            g = lines(model)
+            known[frame] = _Arm(chain, wide, detect(g), general=g)
         elif revolute_only(model) and k == 7:
             for joint in (2, 6, 3, 0, 1, 4, 5):
                 structure = _when_locked(model, joint)
@@ -118,7 +130,8 @@ def _arm(robot: Robot, frame: str) -> _Arm:
                     known[frame] = _Arm(chain, wide, structure, joint, lines(model))
                     break
             else:
-                known[frame] = _Arm(chain, wide, None, ANY_JOINT, lines(model))
+                locked = lines(model, {ANY_JOINT: 0.4})
+                known[frame] = _Arm(chain, wide, None, ANY_JOINT, lines(model), locked)
     return known[frame]
 
 
@@ -169,7 +182,7 @@ def branches(
     Planar arms of up to three joints and SCARA arms: up to two. Six revolute joints in any other position: up to
     sixteen, by elimination and an eigenvalue problem (`general`), about a hundred times slower. What fits is found from
     the axes. An arm whose axes are slightly off (a calibrated one) gets the ideal branches, refined by Newton steps on
-    its true axes.
+    its true axes. At a singularity that leaves a continuum of joint vectors, one member stands for it.
 
     With *limits* only branches within the position limits are returned, on the turn nearest to *q0* ``(..., n)`` or to
     the middle of the limits; else all, in (−π, π]. Coordinates that do not move the frame keep *q0* or home.
@@ -191,9 +204,9 @@ def branches(
         x, number, family = _seven(robot, frame, arm, poses, redundancy, shape)
     elif arm.structure is not None:
         x, number, family = _six(arm.structure, poses)
-    elif revolute_only(model) and arm.chain.free.size == 6:
-        g = lines(model)
-        x, number = general_branches(g.h[None], g.o[None], g.R0[None], poses)
+    elif arm.general is not None:
+        g = arm.general
+        x, number = general_branches(g.h[None], g.o[None], g.R0[None], poses, arm.pair)
         family = GENERAL
     else:
         flat = flat_structure(model)
@@ -204,6 +217,10 @@ def branches(
             )
         x, number, family = flat_branches(flat, model, poses)
     q, valid, residual, codes = _finish(arm, poses, x, number, fill, near, limits)
+    outside = np.flatnonzero(codes == LIMITS)
+    if outside.size and revolute_only(model) and x.shape[2] >= 6:
+        every = _Part(poses, x, number, fill, near)
+        _move_within(robot, frame, arm, every.rows(outside), outside, (q, valid, residual, codes))
     return BranchResult(
         q=q.reshape(*shape, valid.shape[1], robot.n),
         valid=valid.reshape(*shape, valid.shape[1]),
@@ -261,7 +278,7 @@ def _seven(
     assert arm.seven is not None
     at = locked_geometry(arm.seven, joint, values)
     if arm.structure is None:
-        six, number = general_branches(*at, poses)
+        six, number = general_branches(*at, poses, arm.pair)
         family = GENERAL
     else:
         six, number = _run(arm.structure, poses, *idealised(arm.structure, *at))
@@ -291,6 +308,49 @@ def _finish(
 
     over_ranges(work, count, GRAIN)
     return q, valid, residual, codes
+
+
+class _Part(NamedTuple):
+    """What `_finish` reads of a batch of targets."""
+
+    poses: Array
+    x: Array
+    number: IntArray
+    fill: Array
+    near: Array
+
+    def rows(self, index: IntArray) -> _Part:
+        """The targets *index* alone."""
+        fill, near = (v if v.shape[0] == 1 else v[index] for v in (self.fill, self.near))
+        return _Part(self.poses[index], self.x[index], self.number[index], fill, near)
+
+
+def _move_within(
+    robot: Robot, frame: str, arm: _Arm, part: _Part, place: IntArray, out: tuple[Array, BoolArray, Array, IntArray]
+) -> None:
+    """Write into rows *place* of *out* a branch within the limits where a singularity leaves one to be chosen."""
+    chain, column = arm.chain, arm.free.column
+    q, valid, _, _ = _finish(arm, *part, limits=False)
+    owner, which = np.nonzero(valid)
+    q = q[owner, which]
+    six = np.delete(chain.free[column], arm.locked) if arm.locked >= 0 else chain.free[column]
+    at, moves = self_motions(robot, frame, q, six)
+    lower, upper = robot.limits.lower[six], robot.limits.upper[six]
+    good, moved = within_limits(q[at][:, six], moves, lower, upper)
+    if not good.size:
+        return
+    q, owner = q[at[good]], owner[at[good]]
+    q[:, six] = moved
+    near = part.near if part.near.shape[0] == 1 else part.near[owner]
+    fill = part.fill if part.fill.shape[0] == 1 else part.fill[owner]
+    x = np.ascontiguousarray(q[:, None, chain.free[column]])
+    q, valid, residual, codes = _finish(
+        arm, part.poses[owner], x, np.ones(owner.size, np.int64), fill, near, limits=True
+    )
+    for i in np.flatnonzero(codes == 0)[::-1]:
+        row = place[owner[i]]
+        out[0][row], out[1][row], out[2][row], out[3][row] = q[i], False, 0.0, 0
+        out[1][row, 0], out[2][row, 0] = True, residual[i, 0]
 
 
 def redundancy_intervals(

@@ -26,6 +26,8 @@ KEPT = 24
 NEARLY_REAL = 1e-2
 """Imaginary part, over 1 + |x|, up to which an eigenvalue is tried: double roots split by the root of the rounding."""
 BLOCK = 256
+TRIALS = 24
+"""Poses on which a pair of joints to eliminate is tried."""
 GRAIN = 16
 """Smallest share of a batch that is worth a thread."""
 
@@ -113,25 +115,45 @@ def _ratio(w: Any, axis: int) -> Array:
     return np.asarray(np.arctan2(sine, cosine))
 
 
-def first_pair(h: Array, o: Array) -> int:
-    """The first joint of the pair that is eliminated: two neighbours that neither meet nor are parallel.
+def first_pair(h: Array, o: Array, R0: Array) -> int:
+    """The first joint of the pair to eliminate on an arm ``h (6, 3)``, ``o (7, 3)``, ``R0 (3, 3)``, found by trial.
 
-    The arm and its target are a loop, in which joint 1 follows on joint 6; that pair serves where no other does.
+    The arm and its target are a loop, in which joint 1 follows on joint 6: six pairs of neighbours. Pairs that neither
+    meet nor are parallel come first. Where other axes are parallel or meet, some pairs leave singular equations, so
+    the first pair is taken that finds the joint vectors back that made `TRIALS` poses, or the one that misses fewest.
     """
+    skew = []
     for k in range(5):
         normal = np.cross(h[k], h[k + 1])
         sine = float(np.linalg.norm(normal))
-        if sine > 0.05 and abs(normal @ (o[k + 1] - o[k])) > 1e-3 * sine * _length(o):
-            return k
-    return 5
+        skew.append(sine > 0.05 and abs(normal @ (o[k + 1] - o[k])) > 1e-3 * sine * _length(o))
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (TRIALS, 6))
+    poses = np.tile(np.eye(4), (TRIALS, 1, 1))
+    R, p = np.broadcast_to(R0, (TRIALS, 3, 3)), np.broadcast_to(o[6], (TRIALS, 3))
+    for joint in range(5, -1, -1):
+        turn = rotations(np.broadcast_to(h[joint], (TRIALS, 3)), q[:, joint])
+        R, p = turn @ R, o[joint] + (turn @ (p - o[joint])[..., None])[..., 0]
+    poses[:, :3, :3], poses[:, :3, 3] = R, p
+    best, fewest = 5, TRIALS + 1
+    for k in sorted(range(6), key=lambda k: k < 5 and not skew[k]):
+        theta, _ = _candidates(h[None], o[None], R0[None], k, poses)
+        off = np.abs(np.sin(0.5 * (np.roll(theta, k, axis=2) - q[:, None]))).max(axis=2).min(axis=1)
+        missed = int((off > 1e-3).sum())
+        if missed < fewest:
+            best, fewest = k, missed
+        if not missed:
+            break
+    return best
 
 
 def _length(o: Array) -> float:
     return max(float(np.linalg.norm(np.diff(o, axis=0), axis=1).max()), 1e-9)
 
 
-def general_branches(h: Array, o: Array, R0: Array, poses: Array) -> tuple[Array, IntArray]:
+def general_branches(h: Array, o: Array, R0: Array, poses: Array, pair: int) -> tuple[Array, IntArray]:
     """Candidates ``(N, KEPT, 6)`` and how many, for ``poses (N, 4, 4)``; to be refined and checked on the true arm.
+
+    *pair*: see `first_pair`.
 
     Axes ``h (1 or N, 6, 3)``, points on them and the frame's origin ``o (1 or N, 7, 3)``, and the frame's rotation
     ``R0 (1 or N, 3, 3)``, all at zero.
@@ -140,15 +162,14 @@ def general_branches(h: Array, o: Array, R0: Array, poses: Array) -> tuple[Array
     number = np.zeros(len(poses), dtype=np.int64)
     if not len(poses):
         return x, number
-    k = first_pair(h[0], o[0])
 
     def work(begin: int, end: int) -> None:
         for first in range(begin, end, BLOCK):
             part = slice(first, min(first + BLOCK, end))
             own = part if len(h) > 1 else slice(0, 1)
-            theta, good = _candidates(h[own], o[own], R0[own], k, poses[part])
+            theta, good = _candidates(h[own], o[own], R0[own], pair, poses[part])
             order = np.argsort(~good, axis=1, kind="stable")[:, :KEPT]
-            x[part] = np.take_along_axis(np.roll(theta, k, axis=2), order[..., None], axis=1)
+            x[part] = np.take_along_axis(np.roll(theta, pair, axis=2), order[..., None], axis=1)
             number[part] = np.minimum(good.sum(axis=1), KEPT)
 
     over_ranges(work, len(poses), GRAIN)

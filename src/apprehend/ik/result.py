@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Array, BoolArray, IntArray
-from ..errors import InputError, UnsuccessfulError
+from ..errors import InputError
 from ..result import Result, Status
 
 
@@ -111,9 +111,3 @@ class IKResult(Result):
             return text
         first = tuple(int(i) for i in np.argwhere(~good)[0])
         return f"{text}; target {first if len(first) > 1 else first[0]}: {self.reason(*first)}"
-
-    def require_success(self) -> Self:
-        """Return ``self`` if every target is solved, or raise `UnsuccessfulError` with the explanation."""
-        if not np.all(self.codes == 0):
-            raise UnsuccessfulError(self.explain())
-        return self

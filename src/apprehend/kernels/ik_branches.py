@@ -23,6 +23,7 @@ PLANAR = 3
 
 EXACT = 1e-9  # slack of subproblems whose geometry is the arm's own
 ALIKE = 1e-9
+ALIGNED = 1e-7  # sine of the angle below which two axes count as parallel
 MOST = 16  # room for branches; the families here have up to 8
 
 
@@ -337,6 +338,28 @@ def parallel_first(h, o, slack, R, p, first, F, roots):
 
 
 @kernel
+def turn_within(h, a, b, u, v):
+    """The angle about *h* by which *b* must turn for ``a − b`` to be as long across h as ``u + R v`` can be made.
+
+    Zero where it is so already, and where no turn does it; else to the middle of the lengths that can be had.
+    """
+    ha, hb = dot(h, a), dot(h, b)
+    aa, bb = dot(a, a) - ha * ha, dot(b, b) - hb * hb
+    ab = dot(a, b) - ha * hb
+    span = 2.0 * math.sqrt(aa * bb)
+    ru, rv = math.sqrt(dot(u, u)), math.sqrt(dot(v, v))
+    near, far = (ru - rv) ** 2, (ru + rv) ** 2
+    now = aa + bb - 2.0 * ab
+    if near <= now <= far or span < 1e-12 * far:
+        return 0.0
+    low, high = max(near, aa + bb - span), min(far, aa + bb + span)
+    if low > high + 1e-12 * far:
+        return 0.0
+    cosine = (aa + bb - 0.5 * (low + high)) / span
+    return angle_between(h, b, a) + math.acos(min(max(cosine, -1.0), 1.0))
+
+
+@kernel
 def parallel_branches(h, o, slack, R, p, out, three, F, roots):
     """All branches of an arm whose axes 2, 3 and 4 are parallel; ``h[1], h[2], h[3]`` are equal up to sign."""
     h1, h2, h5, h6 = row(h, 0), row(h, 1), row(h, 4), row(h, 5)
@@ -349,24 +372,31 @@ def parallel_branches(h, o, slack, R, p, out, three, F, roots):
     firsts = parallel_first(h, o, slack, R, p, three, F, roots)
     side = across(h2)
     Rt = R.T
+    u23, u34 = dot(h2, p23), dot(h2, p34)
+    q23 = (p23[0] - u23 * h2[0], p23[1] - u23 * h2[1], p23[2] - u23 * h2[2])
+    q34 = (p34[0] - u34 * h2[0], p34[1] - u34 * h2[1], p34[2] - u34 * h2[2])
     count = 0
     for i in range(firsts):
         a1, a5 = three[i, 0], three[i, 1]
         s1, c1 = sincos(a1)
         s5, c5 = sincos(a5)
         # h2ᵀ R1ᵀ R = h2ᵀ R5 R6
-        a6 = angle_between(h6, apply(Rt, turn_by(h1, s1, c1, h2)), turn_by(h5, -s5, c5, h2))
+        lean = turn_by(h5, -s5, c5, h2)
+        a6 = angle_between(h6, apply(Rt, turn_by(h1, s1, c1, h2)), lean)
         # the three joints together turn h2's side by R1ᵀ R R6ᵀ R5ᵀ
         turned = apply(R, turn(h6, -a6, turn_by(h5, -s5, c5, side)))
         total = angle_between(h2, side, turn_by(h1, -s1, c1, turned))
         rest = sub(turn_by(h1, -s1, c1, b), p12)
-        rest = sub(rest, turn(h2, total, add(p45, turn_by(h5, s5, c5, p56))))
+        arm = add(p45, turn_by(h5, s5, c5, p56))
+        apart = cross(h6, lean)
+        if dot(apart, apart) < ALIGNED * ALIGNED:  # axis 6 is parallel to axes 2, 3, 4: every θ6 will do
+            step = turn_within(h2, rest, turn(h2, total, arm), q23, q34)
+            total += step
+            a6 -= step if dot(h6, lean) > 0.0 else -step
+        rest = sub(rest, turn(h2, total, arm))
         # rest = R2 (p23 + R3 p34), within the plane across h2
         along = dot(h2, rest)
         flat = dot(rest, rest) - along * along
-        u23, u34 = dot(h2, p23), dot(h2, p34)
-        q23 = (p23[0] - u23 * h2[0], p23[1] - u23 * h2[1], p23[2] - u23 * h2[2])
-        q34 = (p34[0] - u34 * h2[0], p34[1] - u34 * h2[1], p34[2] - u34 * h2[2])
         many, x, y = angles_at_height(h2, q23, q34, 0.5 * (flat - dot(q23, q23) - dot(q34, q34)), slack)
         for j in range(many):
             a3 = x if j == 0 else y

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, BoolArray, IntArray
-from ..errors import InputError, UnsuccessfulError
+from ..errors import InputError
 from ..kernels import timing_lanes as kernels
 from ..kernels.timing_cubic import WIDE
 from ..kinematics import memory
@@ -85,12 +85,6 @@ class Timings(Result):
         good = self.success
         text = f"{int(good.sum())} of {good.size} paths timed"
         return text if good.all() else f"{text}; path {int(np.argmin(good))}: {self[int(np.argmin(good))].explain()}"
-
-    def require_success(self) -> Timings:
-        """Return ``self`` if every path is timed, or raise `UnsuccessfulError`."""
-        if not self.success.all():
-            raise UnsuccessfulError(self.explain())
-        return self
 
 
 def time_optimal_many(
