@@ -15,7 +15,8 @@ from ..files import replace_file
 from ..kernels import collide
 from ..kinematics import Robot
 from ..robots import Semantics, parse_srdf, read_srdf
-from .nodes import Node, Pair, can_meet, compile_model, link_nodes, linkages, neighbours, pair
+from .compiled import Alone
+from .nodes import Node, Pair, link_nodes, linkages, neighbours, pair
 from .shapes import Convex
 
 SAMPLES = 500
@@ -125,7 +126,7 @@ def by_sampling(
         pair(a.name, b.name)
         for i, a in enumerate(links)
         for b in links[:i]
-        if can_meet(robot.model, a, b) and pair(a.name, b.name) not in reasons
+        if a.carrier != b.carrier and pair(a.name, b.name) not in reasons
     ]
     lower, upper = np.maximum(robot.limits.lower, -np.pi), np.minimum(robot.limits.upper, np.pi)
     q = rng.uniform(lower, upper, (samples, robot.n))
@@ -137,13 +138,14 @@ def by_sampling(
 
 def _touching(robot: Robot, links: Sequence[Node], pairs: Sequence[Pair], q: Array, clearance: float) -> Array:
     """In how many of the configurations ``q (N, n)`` each pair touches."""
-    hits = np.zeros(len(pairs), np.int64)
-    if pairs:
-        number = {node.name: i for i, node in enumerate(links)}
-        blocks = [(number[a], number[b]) for a, b in (sorted(p, key=lambda name: -number[name]) for p in pairs)]
-        model = compile_model(robot, links, blocks)
-        collide.check(model, q, clearance, 0, len(q), np.zeros(0, np.int64), hits)
-    return np.asarray(hits, dtype=np.float64)
+    if not pairs:
+        return np.zeros(0)
+    others = {pair(a.name, b.name) for i, a in enumerate(links) for b in links[:i]} - set(pairs)
+    model = Alone(robot.model, tuple(links), others).with_others((), ())
+    hits = np.zeros(len(model.blocks), np.int64)
+    collide.check(model, q, clearance, 0, len(q), np.zeros(0, np.int64), hits)
+    found = {pair(links[a].name, links[b].name): n for (a, b), n in zip(model.blocks[:, :2], hits, strict=True)}
+    return np.array([found[p] for p in pairs], dtype=np.float64)
 
 
 def srdf_pairs(source: str | Path | Semantics, robot: Robot) -> dict[Pair, str]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,9 +17,9 @@ from ..kernels.collide import CollideModel
 from ..kernels.sphere import SphereModel
 from ..kinematics import Robot
 from .allowed import SAMPLES, by_sampling, srdf_pairs
+from .compiled import Alone
 from .geometry import Geometry
-from .lanes_model import sphere_model
-from .nodes import Node, Pair, can_meet, compile_model, link_nodes, matrix, pair, slide_bounds
+from .nodes import Node, Pair, link_nodes, matrix, moving, pair, slide_bounds
 from .obstacles import as_geometry
 from .shapes import Convex
 
@@ -61,19 +62,17 @@ class Arrangement:
         self.robot = robot
         self.clearance = float(clearance)
         self.resolution = float(resolution)
-        links = link_nodes(robot, geometry)
-        self.nodes: tuple[Node, ...] = links + obstacle_nodes(scene)
-        twice = sorted({n.name for n in links} & {n.name for n in self.nodes[len(links) :]})
+        alone, found = robot_alone(robot, geometry, self.clearance)
+        self.nodes: tuple[Node, ...] = alone.nodes + obstacle_nodes(scene)
+        names = {n.name for n in alone.nodes}
+        twice = sorted(names & {n.name for n in self.nodes[len(names) :]})
         if twice:
             raise InputError(f"{twice[0]!r} names both a link of the robot and an obstacle; rename the obstacle")
-        found, _ = by_sampling(robot, links, self.clearance, SAMPLES, np.random.default_rng(0))
-        self.reasons: Mapping[Pair, str] = found
-        """Why each allowed pair may touch."""
+        self._alone, self._links, self._others = alone, found, dict[Pair, str]()
         self._compiled: CollideModel | None = None
         self._lanes: SphereModel | None = None
-        self.reasons = {**self.reasons, **self._checked_pairs(allowed)}
-        for a, b in scene.allowed if scene is not None else ():
-            self.reasons = {**self.reasons, pair(a, b): "allowed by the scene"}
+        by_scene = scene.allowed if scene is not None else ()
+        self._allow(self._checked_pairs(allowed) | {pair(a, b): "allowed by the scene" for a, b in by_scene})
 
     # --- what may touch ------------------------------------------------------------------------------------------
     def _checked_pairs(self, pairs: Iterable[tuple[str, str]]) -> dict[Pair, str]:
@@ -91,33 +90,61 @@ class Arrangement:
         """Pairs of names that may touch."""
         return frozenset(self.reasons)
 
-    def _with(self, nodes: tuple[Node, ...], reasons: Mapping[Pair, str]) -> Self:
+    @cached_property
+    def reasons(self) -> Mapping[Pair, str]:
+        """Why each allowed pair may touch."""
+        return {**self._links, **self._others}
+
+    def _allow(self, pairs: Mapping[Pair, str]) -> None:
+        """Take *pairs* into a model that is being made."""
+        links = {node.name for node in self._alone.nodes}
+        own = {p: reason for p, reason in pairs.items() if p <= links}
+        self._others = {**self._others, **{p: reason for p, reason in pairs.items() if p not in own}}
+        if own:
+            self._links = {**self._links, **own}
+            self._alone = self._alone.allowing(self._links.keys())
+
+    def _with(self, nodes: tuple[Node, ...] | None = None, without: str | None = None) -> Self:
+        """A model with these *nodes* instead, *without* what was allowed to touch the thing of that name."""
         other = object.__new__(type(self))
         other.robot, other.clearance, other.resolution = self.robot, self.clearance, self.resolution
-        other.nodes, other.reasons, other._compiled, other._lanes = nodes, dict(reasons), None, None
+        other.nodes = self.nodes if nodes is None else nodes
+        other._alone, other._links, other._others = self._alone, self._links, self._others
+        if without is not None:
+            other._others = {p: reason for p, reason in self._others.items() if without not in p}
+        other._compiled = other._lanes = None
         return other
 
     def allow(self, pairs: Iterable[tuple[str, str]]) -> Self:
         """The model in which these pairs of names may touch, too."""
-        return self._with(self.nodes, {**self.reasons, **self._checked_pairs(pairs)})
+        other = self._with()
+        other._allow(self._checked_pairs(pairs))
+        return other
 
     def allow_srdf(self, source: str | Path | Semantics) -> Self:
         """The model in which the pairs of an SRDF may touch, too: a file's path, its text, or read already.
 
         Raises `DescriptionError` for links that the robot does not have.
         """
-        return self._with(self.nodes, {**self.reasons, **srdf_pairs(source, self.robot)})
+        other = self._with()
+        other._allow(srdf_pairs(source, self.robot))
+        return other
 
     def forbid(self, pairs: Iterable[tuple[str, str]]) -> Self:
         """The model in which these pairs of names are checked again."""
         checked = self._checked_pairs(pairs)
-        return self._with(self.nodes, {p: reason for p, reason in self.reasons.items() if p not in checked})
+        other = self._with()
+        other._others = {p: reason for p, reason in self._others.items() if p not in checked}
+        if not checked.keys().isdisjoint(self._links):
+            other._links = {p: reason for p, reason in self._links.items() if p not in checked}
+            other._alone = self._alone.allowing(other._links.keys())
+        return other
 
     def with_clearance(self, clearance: float, resolution: float | None = None) -> Self:
         """The model with another clearance (and resolution)."""
         if not (math.isfinite(clearance) and clearance >= 0.0):
             raise InputError(f"clearance is {clearance}; expected 0 or more, in m")
-        other = self._with(self.nodes, self.reasons)
+        other = self._with()
         other.clearance, other._compiled = float(clearance), self._compiled
         other.resolution = self.resolution if resolution is None else float(resolution)
         return other
@@ -154,19 +181,19 @@ class Arrangement:
                 raise InputError(
                     f"{name!r} has a {type(shape).__name__}; only bodies and convex shapes can be attached"
                 )
+        if name in self.robot.frame_names:
+            raise InputError(f"{name!r} is a link of the robot; an attached body needs another name")
         f = self.robot.frame_index(frame)
         tree = self.robot.model
         carrier = int(tree.frame_joint[f])
         T = as_pose(pose, "pose")
         place = matrix(tree.frame_place[f]) @ T
-        node = Node(name, carrier, tuple(shape.at(place) for shape in shapes), frame, T)
+        node = moving(self.robot, Node(name, carrier, tuple(shape.at(place) for shape in shapes), frame, T))
         if touching is None:
             touching = [n.name for n in self.nodes if n.attached_to is None and self._beyond(n.carrier, carrier)]
-        others = tuple(n for n in self.nodes if n.name != name)
-        reasons = {p: reason for p, reason in self.reasons.items() if name not in p}
-        model = self._with((*others, node), reasons)
-        checked = model._checked_pairs((name, link) for link in touching)
-        return model._with(model.nodes, {**reasons, **dict.fromkeys(checked, "holds the body")})
+        model = self._with((*(n for n in self.nodes if n.name != name), node), name)
+        model._allow(dict.fromkeys(model._checked_pairs((name, link) for link in touching), "holds the body"))
+        return model
 
     def _beyond(self, carrier: int, base: int) -> bool:
         tree = self.robot.model
@@ -180,16 +207,17 @@ class Arrangement:
         if node.attached_to is None or node.pose is None:
             raise InputError(f"{name!r} is not attached to the robot")
         others = tuple(n for n in self.nodes if n.name != name)
-        reasons = {p: reason for p, reason in self.reasons.items() if name not in p}
         if pose is not None:
             f = self.robot.frame_index(node.attached_to)
             back = np.linalg.inv(matrix(self.robot.model.frame_place[f]) @ node.pose)
             T = as_pose(pose, "pose") @ back
             others = (*others, Node(name, -1, tuple(shape.at(T) for shape in node.shapes)))
-        return self._with(others, reasons)
+        return self._with(others, name)
 
     def add(self, name: str, body: Body | Geometry | Sequence[Geometry], pose: ArrayLike | None = None) -> Self:
         """The model with one more obstacle, or with another one of that name, at *pose* (T_world_body).
+
+        What an obstacle may touch, another one of its name may touch; what an attached body may touch is forgotten.
 
         An obstacle is a body (its convex pieces), a distance field of one, or geometry of any kind: `Convex`,
         `HalfSpace`, `Cloud`, `Union`, `Grid`, or several of them.
@@ -198,14 +226,14 @@ class Arrangement:
             raise InputError(f"{name!r} is a link of the robot; an obstacle needs another name")
         T = np.eye(4) if pose is None else as_pose(pose, "pose")
         node = Node(name, -1, tuple(shape.at(T) for shape in _shapes_of(body, name)[0]))
-        return self._with((*(n for n in self.nodes if n.name != name), node), self.reasons)
+        attached = any(n.name == name and n.attached_to is not None for n in self.nodes)
+        return self._with((*(n for n in self.nodes if n.name != name), node), name if attached else None)
 
     def remove(self, name: str) -> Self:
         """The model without the obstacle or attached body *name*."""
         if self._node(name).name in self.robot.frame_names:
             raise InputError(f"{name!r} is a link of the robot; only obstacles and attached bodies can be removed")
-        reasons = {p: reason for p, reason in self.reasons.items() if name not in p}
-        return self._with(tuple(n for n in self.nodes if n.name != name), reasons)
+        return self._with(tuple(n for n in self.nodes if n.name != name), name)
 
     @cached_property
     def unmodelled(self) -> tuple[str, ...]:
@@ -225,27 +253,49 @@ class Arrangement:
         return coordinate, gain, slide_bounds(self.robot, slides)
 
     @property
+    def _around(self) -> tuple[Node, ...]:
+        """What is no link of the robot."""
+        return self.nodes[len(self._alone.nodes) :]
+
+    @property
     def compiled(self) -> CollideModel:
         """Arrays for the kernels (layout: `apprehend.kernels.collide`)."""
         if self._compiled is None:
-            tree = self.robot.model
-            blocks = [
-                (i, j)
-                for i, a in enumerate(self.nodes)
-                for j, b in enumerate(self.nodes[:i])
-                if can_meet(tree, a, b) and pair(a.name, b.name) not in self.reasons
-            ]
-            # the moving one first: its sphere is tested against the oriented box of the other
-            blocks = [(i, j) if self.nodes[i].carrier >= 0 else (j, i) for i, j in blocks]
-            self._compiled = compile_model(self.robot, self.nodes, blocks)
+            self._compiled = self._alone.with_others(self._around, self._others)
         return self._compiled
 
     @property
     def lanes(self) -> SphereModel:
         """Arrays for the sphere kernels (layout: `apprehend.kernels.sphere`)."""
         if self._lanes is None:
-            self._lanes = sphere_model(self.compiled, self.nodes, self.clearance)
+            self._lanes = self._alone.on_lanes(self.compiled, self._around, self.clearance)
         return self._lanes
+
+
+def robot_alone(
+    robot: Robot, geometry: Mapping[str, Sequence[Convex]] | None, clearance: float
+) -> tuple[Alone, dict[Pair, str]]:
+    """The robot's links and which of them may touch, with the reasons; found once for a robot and its own geometry."""
+    if geometry is not None:
+        return _robot_alone(robot, link_nodes(robot, geometry), clearance)
+    known = KNOWN.setdefault(robot, {})
+    if clearance not in known:
+        links = next(iter(known.values()))[0].nodes if known else link_nodes(robot)
+        while len(known) >= MOST_CLEARANCES:
+            del known[next(iter(known))]
+        known[clearance] = _robot_alone(robot, links, clearance)
+    return known[clearance]
+
+
+def _robot_alone(robot: Robot, links: tuple[Node, ...], clearance: float) -> tuple[Alone, dict[Pair, str]]:
+    found, _ = by_sampling(robot, links, clearance, SAMPLES, np.random.default_rng(0))
+    return Alone(robot.model, links, found.keys()), found
+
+
+KNOWN: WeakKeyDictionary[Robot, dict[float, tuple[Alone, dict[Pair, str]]]] = WeakKeyDictionary()
+"""For the robots that are in use: what `robot_alone` found at some clearances. (A robot is a value.)"""
+
+MOST_CLEARANCES = 4
 
 
 def _shapes_of(body: Body | Geometry | Sequence[Geometry], name: str | None) -> tuple[tuple[Geometry, ...], str]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
-from ..arrays import Array
-from ..errors import InputError
-from .geometry import Geometry
-from .obstacles import Cloud, Grid, Union
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array, IntArray
 
 MOST = 1_000_000
 """Most cells of a table, about."""
@@ -16,28 +16,28 @@ FINEST = 0.004
 """Smallest side of a cell in m."""
 
 
-def cell_table(shape: Geometry) -> tuple[Array, float, Array]:
-    """The corner (3,) of a grid in the shape's frame, the side of its cells, and a bound for each cell (float32).
+class CellTable(NamedTuple):
+    """A grid in the frame of a shape, and a bound for each cell.
 
     No point of a cell is nearer to the shape than the bound, and no point outside the grid nearer than the bound of
     the nearest cell and the distance to it make it.
     """
-    if isinstance(shape, Grid):
-        low = shape.samples
-        for axis in range(3):
-            n = low.shape[axis] - 1
-            low = np.minimum(low.take(range(n), axis), low.take(range(1, n + 1), axis))
-        return -shape.half, shape.spacing, _rounded_down(low / shape.steepness)
-    if isinstance(shape, Cloud):
-        return _around(shape.points, shape.points, shape.radius)
-    if isinstance(shape, Union):
-        reach = [np.abs(s.pose[:3, :3]) @ s.half for s in shape.shapes]
-        centres = np.array([s.pose[:3, 3] for s in shape.shapes])
-        return _around(centres - reach, centres + reach, 0.0)
-    raise InputError(f"there is no table of cells for a {type(shape).__name__}")
+
+    corner: Array  # (3,)
+    side: float  # of a cell
+    bounds: NDArray[np.float32]  # (nx, ny, nz)
 
 
-def _around(low: Array, high: Array, radius: float) -> tuple[Array, float, Array]:
+def within(samples: Array, spacing: float, steepness: float) -> CellTable:
+    """The table of a field that is sampled at the corners of the cells."""
+    low = samples
+    for axis in range(3):
+        n = low.shape[axis] - 1
+        low = np.minimum(low.take(range(n), axis), low.take(range(1, n + 1), axis))
+    return CellTable(-0.5 * spacing * (np.array(samples.shape) - 1.0), spacing, _rounded_down(low / steepness))
+
+
+def around(low: Array, high: Array, radius: float) -> CellTable:
     """The table for boxes from ``low (N, 3)`` to ``high (N, 3)``, grown by *radius*."""
     from scipy.ndimage import distance_transform_edt
 
@@ -49,11 +49,26 @@ def _around(low: Array, high: Array, radius: float) -> tuple[Array, float, Array
     corner = corner - 2.0 * side
     count = np.floor((end - corner) / side).astype(np.int64) + 3
     first, last = (np.floor((p - corner) / side).astype(np.int64) for p in (low, high))
-    near = np.zeros(tuple(count), dtype=bool)
-    for a, b in np.unique(np.stack([first, last], axis=1), axis=0):
-        near[a[0] - 1 : b[0] + 2, a[1] - 1 : b[1] + 2, a[2] - 1 : b[2] + 2] = True  # and the cells that touch them
-    return corner, side, _rounded_down(distance_transform_edt(~near) * side - radius)
+    near = _covered(first, last, count)
+    return CellTable(corner, side, _rounded_down(distance_transform_edt(~near) * side - radius))
 
 
-def _rounded_down(bounds: Array) -> Array:
+def _covered(first: IntArray, last: IntArray, count: IntArray) -> NDArray[np.bool_]:
+    """The cells from ``first (N, 3)`` to ``last (N, 3)`` of each box, and those that touch them.
+
+    A box adds one to all cells beyond its first corner, and takes it away beyond its others: sums along the axes.
+    """
+    steps = np.zeros(tuple(count + 1), np.int32)
+    a, b = first - 1, last + 2
+    for corner in range(8):
+        side = [(corner >> axis) & 1 for axis in range(3)]
+        place = tuple(np.where(side, b, a).T)
+        np.add.at(steps, place, 1 - 2 * (sum(side) % 2))
+    for axis in range(3):
+        np.cumsum(steps, axis=axis, out=steps)
+    covered: NDArray[np.bool_] = steps[:-1, :-1, :-1] > 0
+    return covered
+
+
+def _rounded_down(bounds: Array) -> NDArray[np.float32]:
     return np.ascontiguousarray(bounds - 1e-6 * np.abs(bounds), dtype=np.float32)

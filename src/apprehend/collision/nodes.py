@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Array, IntArray
 from ..errors import InputError
-from ..kernels.collide import CollideModel
 from ..kernels.tree import TreeModel
 from ..kinematics import Robot
 from ..robots.description import Description, JointType
-from .geometry import Geometry, pack
+from .geometry import Geometry, Part, part_of
 from .shapes import Convex, link_shapes
+from .spheres import Covered, covered
+from .standing import Standing, standing
 
 UNBOUNDED_TRAVEL = 100.0
 """Travel in m that is assumed for a sliding joint without limits when the motion of what it carries is bounded."""
@@ -31,6 +34,38 @@ class Node:
     shapes: tuple[Geometry, ...]
     attached_to: str | None = None  # frame that an attached body moves with
     pose: Array | None = None  # of an attached body in that frame
+    travel: Array | None = None  # of what moves: see `reach`
+
+    @cached_property
+    def ball(self) -> Array:
+        """A sphere (centre, radius) that holds the node, in its carrier: around the box around the shapes' spheres."""
+        if len(self.shapes) == 1:
+            centre, radius = self.shapes[0].ball
+            return np.array([*centre, radius * (1.0 + 1e-12)]) if radius < np.inf else np.array([0.0, 0.0, 0.0, np.inf])
+        centres = np.array([shape.ball[0] for shape in self.shapes])
+        radii = np.array([shape.ball[1] for shape in self.shapes])
+        if np.isinf(radii).any():
+            return np.array([0.0, 0.0, 0.0, np.inf])
+        centre = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
+        radius = float((np.linalg.norm(centres - centre, axis=1) + radii).max())
+        return np.array([*centre, radius * (1.0 + 1e-12)])
+
+    @cached_property
+    def part(self) -> Part:
+        """Rows of the shapes for the kernels."""
+        return part_of(self.shapes, self.carrier)
+
+    @cached_property
+    def standing(self) -> Standing:
+        """Rows of the shapes for the sphere kernels, where the node stands still."""
+        return standing(self.shapes)
+
+    def covered(self, tree: TreeModel, small: float) -> Covered:
+        """Spheres around the shapes of a node that moves; *tree* and *small* are those of its robot."""
+        if "spheres" not in self.__dict__:
+            self.__dict__["spheres"] = covered(tree, self.carrier, self.shapes, small)
+        found: Covered = self.__dict__["spheres"]
+        return found
 
 
 def pair(a: str, b: str) -> Pair:
@@ -47,10 +82,15 @@ def link_nodes(robot: Robot, geometry: Mapping[str, Sequence[Convex]] | None = N
         shapes = link_shapes(robot.description.links[name]) if geometry is None else tuple(geometry.get(name, ()))
         if shapes:
             place = matrix(tree.frame_place[f])
-            nodes.append(Node(name, int(tree.frame_joint[f]), tuple(shape.at(place) for shape in shapes)))
+            nodes.append(moving(robot, Node(name, int(tree.frame_joint[f]), tuple(s.at(place) for s in shapes))))
     if not nodes:
         raise InputError(f"robot {robot.name!r} has no collision geometry: nothing could be checked")
     return tuple(nodes)
+
+
+def moving(robot: Robot, node: Node) -> Node:
+    """The node with the bounds on its travel."""
+    return replace(node, travel=reach(robot.model, robot, node)) if node.carrier >= 0 else node
 
 
 def matrix(flat: Array) -> Array:
@@ -105,11 +145,6 @@ def linkages(tree: TreeModel, nodes: Sequence[Node]) -> set[Pair]:
     return pairs
 
 
-def can_meet(tree: TreeModel, a: Node, b: Node) -> bool:
-    """Whether two nodes move against each other at all."""
-    return a.carrier != b.carrier and bool(between(tree, a.carrier, b.carrier))
-
-
 def reach(tree: TreeModel, robot: Robot, node: Node) -> Array:
     """How far any point of the node moves at most per rad or m of each joint's value, over all configurations (m,).
 
@@ -118,18 +153,18 @@ def reach(tree: TreeModel, robot: Robot, node: Node) -> Array:
     out = np.zeros(len(tree.kind))
     radius, across = 0.0, 0.0  # of the ball about the joint's origin that holds the node, and about its axis
     for shape in node.shapes:
-        centre, r = shape.ball
-        radius = max(radius, float(np.linalg.norm(centre)) + r)
-        across = max(across, float(np.hypot(centre[0], centre[1])) + r)
+        (x, y, z), r = shape.ball
+        radius = max(radius, math.sqrt(x * x + y * y + z * z) + r)
+        across = max(across, math.hypot(x, y) + r)
     for joint in ancestors(tree, node.carrier):
         if tree.kind[joint] == 0:
             out[joint] = across
         else:
             out[joint] = 1.0
             radius += float(slide_bounds(robot, np.array([joint]))[0])
-        x, y, z = tree.place[joint, 9:]
-        across = float(np.hypot(x, y)) + radius
-        radius += float(np.sqrt(x * x + y * y + z * z))
+        x, y, z = tree.place[joint, 9:].tolist()
+        across = math.hypot(x, y) + radius
+        radius += math.sqrt(x * x + y * y + z * z)
     return out
 
 
@@ -139,41 +174,3 @@ def slide_bounds(robot: Robot, joints: IntArray) -> Array:
     c, gain = tree.coordinate[joints], tree.gain[joints]
     ends = np.abs(np.stack([limits.lower[c], limits.upper[c]]) * gain[:, 0] + gain[:, 1])
     return np.where(np.isfinite(ends).all(axis=0), ends.max(axis=0, initial=0.0), UNBOUNDED_TRAVEL)
-
-
-def node_ball(node: Node) -> Array:
-    """A sphere (centre, radius) that holds the node, in its carrier (Ritter's two passes over the shapes' spheres)."""
-    centres = np.array([shape.ball[0] for shape in node.shapes])
-    radii = np.array([shape.ball[1] for shape in node.shapes])
-    if np.isinf(radii).any():
-        return np.array([0.0, 0.0, 0.0, np.inf])
-    centre = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
-    radius = float((np.linalg.norm(centres - centre, axis=1) + radii).max())
-    return np.array([*centre, radius * (1.0 + 1e-12)])
-
-
-def compile_model(robot: Robot, nodes: Sequence[Node], blocks: Iterable[tuple[int, int]]) -> CollideModel:
-    """Arrays for the kernels; *blocks* are pairs of indices into *nodes*, in the order in which they are tested."""
-    tree = robot.model
-    shapes = [shape for node in nodes for shape in node.shapes]
-    arrays = pack(shapes)
-    start = np.cumsum([0] + [len(node.shapes) for node in nodes])
-    for k, node in enumerate(nodes):
-        arrays.ints[start[k] : start[k + 1], 3] = node.carrier
-    m = len(tree.kind)
-    rows: list[list[int]] = []
-    pairs: list[tuple[int, int]] = []
-    for a, b in blocks:
-        begin = len(pairs)
-        pairs += [(g, h) for g in range(start[a], start[a + 1]) for h in range(start[b], start[b + 1])]
-        both = set(ancestors(tree, nodes[a].carrier)) & set(ancestors(tree, nodes[b].carrier))
-        rows.append([a, b, begin, len(pairs), *(int(j in both) for j in range(m))])
-    parts = [[*node_ball(node), node.carrier, *reach(tree, robot, node)] for node in nodes]
-    return CollideModel(
-        links=np.stack([tree.parent, tree.kind, tree.coordinate], axis=1),
-        joints=np.concatenate([tree.place, tree.gain], axis=1),
-        shapes=arrays,
-        nodes=np.array(parts, np.float64).reshape(len(nodes), 5 + m),
-        blocks=np.array(rows, np.int64).reshape(len(rows), 4 + m),
-        pairs=np.array(pairs, np.int64).reshape(-1, 2),
-    )

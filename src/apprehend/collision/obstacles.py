@@ -14,7 +14,8 @@ from ..arrays import Array, as_array, as_shaped, as_vector
 from ..errors import InputError
 from ..kernels.gjk import CLOUD, FIELD, HALF_SPACE, TREE
 from ..kernels.grid_search import HEADER
-from .geometry import ROUND_OFF, Geometry, positive
+from .cells import CellTable, around, within
+from .geometry import ROUND_OFF, Geometry, pose_free, positive
 from .shapes import Convex, hulls
 
 if TYPE_CHECKING:
@@ -102,21 +103,30 @@ class Cloud(Geometry):
             p, radius = means, radius + float(away)
         return Cloud(np.ascontiguousarray(p), float(radius))
 
-    @functools.cached_property
+    @pose_free
     def middle(self) -> Array:
         """Centre of the box around the points, in the cloud's frame."""
         return np.asarray(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)))
 
-    @functools.cached_property
+    @pose_free
     def half(self) -> Array:
         """Half extents of the box about the cloud's origin."""
         return np.asarray(np.abs(self.points).max(axis=0) * (1.0 + ROUND_OFF) + self.radius)
 
-    @functools.cached_property
+    @pose_free
+    def reach(self) -> float:
+        """Radius of a ball about the middle that holds all."""
+        return float(np.linalg.norm(self.points - self.middle, axis=1).max()) * (1.0 + ROUND_OFF) + self.radius
+
+    @property
     def ball(self) -> tuple[Array, float]:
         """A sphere that holds all."""
-        reach = float(np.linalg.norm(self.points - self.middle, axis=1).max()) * (1.0 + ROUND_OFF) + self.radius
-        return self.pose[:3, :3] @ self.middle + self.pose[:3, 3], reach
+        return self.pose[:3, :3] @ self.middle + self.pose[:3, 3], self.reach
+
+    @pose_free
+    def cells(self) -> CellTable:
+        """Lower bounds on distances, for the sphere kernels."""
+        return around(self.points, self.points, self.radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,19 +176,31 @@ class Union(Geometry):
         """The shapes."""
         return self.shapes
 
-    @functools.cached_property
+    @pose_free
     def half(self) -> Array:
         """Half extents of the box about the union's origin."""
         ends = [np.abs(s.pose[:3, 3]) + np.abs(s.pose[:3, :3]) @ s.half for s in self.shapes]
         return np.asarray(np.max(ends, axis=0))
 
-    @functools.cached_property
-    def ball(self) -> tuple[Array, float]:
-        """A sphere that holds all."""
+    @pose_free
+    def around(self) -> tuple[Array, float]:
+        """A ball that holds all, in the union's frame."""
         centres, radii = np.array([s.ball[0] for s in self.shapes]), np.array([s.ball[1] for s in self.shapes])
         middle = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
-        reach = float((np.linalg.norm(centres - middle, axis=1) + radii).max()) * (1.0 + ROUND_OFF)
+        return middle, float((np.linalg.norm(centres - middle, axis=1) + radii).max()) * (1.0 + ROUND_OFF)
+
+    @property
+    def ball(self) -> tuple[Array, float]:
+        """A sphere that holds all."""
+        middle, reach = self.around
         return self.pose[:3, :3] @ middle + self.pose[:3, 3], reach
+
+    @pose_free
+    def cells(self) -> CellTable:
+        """Lower bounds on distances, for the sphere kernels."""
+        reach = np.array([np.abs(s.pose[:3, :3]) @ s.half for s in self.shapes])
+        centres = np.array([s.pose[:3, 3] for s in self.shapes])
+        return around(centres - reach, centres + reach, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,9 +239,9 @@ class Grid(Geometry):
             )
         pose = np.eye(4)
         pose[:3, 3] = o + 0.5 * spacing * (np.array(v.shape) - 1.0)
-        return Grid(v, float(spacing), pose)
+        return Grid(v.copy(), float(spacing), pose)
 
-    @functools.cached_property
+    @pose_free
     def steepness(self) -> float:
         """A Lipschitz constant of the interpolated field: 1 for an exact distance, a little more near its ridges."""
         most = np.zeros(tuple(n - 1 for n in self.samples.shape))
@@ -232,7 +254,7 @@ class Grid(Geometry):
             most += slope**2
         return max(1.0, float(np.sqrt(most.max())))
 
-    @functools.cached_property
+    @pose_free
     def values(self) -> Array:
         """Header and values for the kernels."""
         v = self.samples
@@ -249,6 +271,11 @@ class Grid(Geometry):
     def ball(self) -> tuple[Array, float]:
         """A sphere that holds the grid."""
         return self.pose[:3, 3], float(np.linalg.norm(self.half))
+
+    @pose_free
+    def cells(self) -> CellTable:
+        """Lower bounds on distances, for the sphere kernels."""
+        return within(self.samples, self.spacing, self.steepness)
 
     @functools.cached_property
     def crossings(self) -> Cloud:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import functools
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..kernels.gjk import BOX, CONE, CYLINDER, ELLIPSOID, HULL
 from ..robots import load_shape_mesh
 from ..robots.description import Link, Shape, ShapeKind
-from .geometry import ROUND_OFF, Geometry, positive
+from .geometry import ROUND_OFF, Geometry, pose_free, positive
 
 FILLED = 0.85
 """A closed mesh that fills this share of its convex hull is taken as the hull; others are cut into a few hulls."""
@@ -75,7 +75,7 @@ class Convex(Geometry):
         """An ellipsoid of radii (3,) along its axes."""
         size = as_vector(radii, "radii", 3)
         positive("the radii of an ellipsoid", *size)
-        return Convex(ELLIPSOID, size)
+        return Convex(ELLIPSOID, size.copy())
 
     @staticmethod
     def hull(vertices: ArrayLike, radius: float = 0.0) -> Convex:
@@ -92,7 +92,7 @@ class Convex(Geometry):
         pose[:3, :3], pose[:3, 3] = turn, centre
         return Convex(HULL, radius=float(radius), points=np.ascontiguousarray(local[kept]), faces=faces, pose=pose)
 
-    @functools.cached_property
+    @pose_free
     def half(self) -> Array:
         """Half extents (3,) of the box about the shape's origin, in the shape's frame, that holds it."""
         if self.kind in (BOX, ELLIPSOID):
@@ -101,29 +101,34 @@ class Convex(Geometry):
             half = np.array([self.size[0], self.size[0], self.size[1]])
         else:
             half = np.abs(self.points).max(axis=0)
-        return half * (1.0 + ROUND_OFF) + self.radius
+        return np.asarray(half * (1.0 + ROUND_OFF) + self.radius)
 
-    @functools.cached_property
+    @pose_free
+    def reach(self) -> float:
+        """Radius of a sphere about the shape's origin that holds it."""
+        if self.kind in (CYLINDER, CONE):
+            core = math.hypot(self.size[0], self.size[1])
+        elif self.kind == ELLIPSOID:
+            core = float(self.size.max())
+        else:
+            core = float(np.linalg.norm(self.points if self.kind == HULL else self.half[None], axis=1).max())
+        return core * (1.0 + ROUND_OFF) + self.radius
+
+    @property
     def ball(self) -> tuple[Array, float]:
         """Centre (3,) and radius of a sphere that holds the shape, in the carrier's frame."""
-        core = np.linalg.norm(self.points, axis=1).max() if self.kind == HULL else np.linalg.norm(self.half)
-        if self.kind in (CYLINDER, CONE):
-            core = np.hypot(self.size[0], self.size[1])
-        elif self.kind == ELLIPSOID:
-            core = self.size.max()
-        return self.pose[:3, 3], float(core) * (1.0 + ROUND_OFF) + self.radius
+        return self.pose[:3, 3], self.reach
 
-    @functools.cached_property
-    def neighbours(self) -> list[list[int]]:
-        """For every vertex of a hull, the vertices that share an edge with it."""
-        if not len(self.faces):  # a flat set: everything is near everything
-            return [[i for i in range(len(self.points)) if i != k] for k in range(len(self.points))]
-        sets: list[set[int]] = [set() for _ in self.points]
-        for i, j, k in self.faces:
-            sets[i] |= {int(j), int(k)}
-            sets[j] |= {int(i), int(k)}
-            sets[k] |= {int(i), int(j)}
-        return [sorted(s) for s in sets]
+    @pose_free
+    def graph(self) -> tuple[IntArray, IntArray]:
+        """Neighbours of the vertices of a hull: where those of each vertex end, and all of them, ascending."""
+        count = len(self.points)
+        if len(self.faces):
+            i, j = self.faces[:, [0, 1, 2, 1, 2, 0]], self.faces[:, [1, 2, 0, 0, 1, 2]]
+            pairs = np.unique(i * count + j)
+        else:  # a flat set: everything is near everything
+            pairs = np.flatnonzero(~np.eye(count, dtype=bool))
+        return np.cumsum(np.bincount(pairs // max(count, 1), minlength=count)), pairs % max(count, 1)
 
 
 def _box_frame(points: Array) -> tuple[Array, Array]:

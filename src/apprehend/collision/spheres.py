@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import heapq
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +16,8 @@ from ..bodies.cache import cache_folder
 from ..bodies.fit import ball
 from ..files import replace_file
 from ..kernels.gjk import BOX, CONE, CYLINDER, HULL
+from ..kernels.tree import TreeModel
+from .geometry import Geometry
 from .shapes import Convex
 
 MOST = 24
@@ -37,6 +41,15 @@ def cover(shape: Convex, most: int = MOST, small: float = SMALL) -> Array:
     """
     if shape.kind == HULL and len(shape.points) == 1:
         return np.array([[*shape.pose[:3, 3], shape.radius]])
+    known = shape.known
+    if (most, small) not in known:
+        known[most, small] = _cover(shape, most, small)
+    balls = known[most, small]
+    centres = balls[:, :3] @ shape.pose[:3, :3].T + shape.pose[:3, 3]
+    return np.column_stack([centres, balls[:, 3] + shape.radius])
+
+
+def _cover(shape: Convex, most: int, small: float) -> Array:
     points, edges = _outline(shape)
     key = hashlib.sha256(f"2:{most}:{small}:{FINE}:{len(edges)}".encode())
     key.update(points.tobytes())
@@ -46,8 +59,34 @@ def cover(shape: Convex, most: int = MOST, small: float = SMALL) -> Array:
         balls = _split(points, edges, most, max(small, FINE * float(shape.half.min() - shape.radius)))
         with replace_file(kept) as work:
             np.savez(work, balls=balls)
-    centres = balls[:, :3] @ shape.pose[:3, :3].T + shape.pose[:3, 3]
-    return np.column_stack([centres, balls[:, 3] + shape.radius])
+    return balls
+
+
+class Covered(NamedTuple):
+    """The spheres of something that moves."""
+
+    balls: Array  # (k, 4)
+    exactly: bool  # whether they are the shapes themselves
+    around: Array  # (4,): a sphere that holds them all
+    centre: Array  # (3,) and radius of a ball that nothing of it ever leaves
+    radius: float
+
+
+def covered(tree: TreeModel, carrier: int, shapes: Sequence[Geometry], small: float) -> Covered:
+    """Spheres around *shapes* on joint *carrier* of a robot's *tree*.
+
+    The ball that they never leave is about the first joint that moves them, as far as the links reach.
+    """
+    balls = np.concatenate([cover(shape, small=small) for shape in shapes if isinstance(shape, Convex)])
+    exactly = all(shape.kind == HULL and len(shape.points) == 1 for shape in shapes)
+    middle = 0.5 * ((balls[:, :3] - balls[:, 3:]).min(axis=0) + (balls[:, :3] + balls[:, 3:]).max(axis=0))
+    reach = float((np.linalg.norm(balls[:, :3] - middle, axis=1) + balls[:, 3]).max()) * (1.0 + 1e-12)
+    radius = float(np.linalg.norm(middle)) + reach
+    while tree.kind[carrier] == 0 and tree.parent[carrier] >= 0:
+        radius += float(np.linalg.norm(tree.place[carrier, 9:]))
+        carrier = int(tree.parent[carrier])
+    radius = radius * (1.0 + 1e-12) if tree.kind[carrier] == 0 else np.inf
+    return Covered(balls, exactly, np.array([*middle, reach]), tree.place[carrier, 9:], radius)
 
 
 def _read(path: Path) -> Array | None:
@@ -62,8 +101,11 @@ def _read(path: Path) -> Array | None:
 def _outline(shape: Convex) -> tuple[Array, list[tuple[int, int]]]:
     """Points whose hull contains the core, and its edges (empty: every pair of points)."""
     if shape.kind == HULL:
-        edges = [(i, j) for i, near in enumerate(shape.neighbours) for j in near if i < j] if len(shape.faces) else []
-        return shape.points, edges
+        if not len(shape.faces):
+            return shape.points, []
+        ends, j = shape.graph
+        i = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
+        return shape.points, [(int(a), int(b)) for a, b in zip(i[i < j], j[i < j])]
     if shape.kind in (CYLINDER, CONE):
         angle = np.arange(SIDES) * (2.0 * np.pi / SIDES)
         radius, height = shape.size[0] / np.cos(np.pi / SIDES), shape.size[1]

@@ -268,15 +268,15 @@ def _packed(shapes: tuple[Convex, ...]) -> tuple[IntArray, Array, Array, IntArra
     """The shapes and a triangle behind them in the layout of `kernels.gjk`, each in its own frame."""
     count = len(shapes)
     ints, floats = np.zeros((count + 1, 4), np.int64), np.zeros((count + 1, 23))
-    points, ends, around = [], [0], []
+    points, ends, around = [], [0], list[int]()
     start = 0
     for i, shape in enumerate(shapes):
         ints[i, :3] = shape.kind, start, len(shape.points)
         floats[i, :3], floats[i, 3], floats[i, 20:] = shape.size, shape.radius, shape.half
         points.append(shape.points)
-        for row in shape.neighbours if len(shape.points) else ():
-            around += row
-            ends.append(len(around))
+        last, near = shape.graph
+        ends += (len(around) + last).tolist()
+        around += near.tolist()
         start += len(shape.points)
     ints[count, 1:3] = start, 3
     triangle = [[1, 2], [0, 2], [0, 1]]
