@@ -13,6 +13,7 @@ from ..arrays import Array
 from ..collision import CollisionModel
 from ..grasp import Candidate
 from .context import Context
+from .posture import closed, opened
 
 STANDOFF = 0.08
 """Distance in m from which the open hand approaches in a straight line, and to which it backs off."""
@@ -61,6 +62,11 @@ class Models:
         """The body where it was located; the hand may touch it."""
         return self.free.allow(self.touching)
 
+    @property
+    def way(self) -> CollisionModel:
+        """The body where it was located, on the way to it: jaws may come near, fingers must not touch it before."""
+        return self.open if self._context.hand.is_jaw else self.free
+
     def carrying(self, held: Array) -> CollisionModel:
         """The body in the hand at *held* (T_hand_body)."""
         return self.free.attach(self._body, self._context.hand.root, held)
@@ -102,22 +108,22 @@ def choose(context: Context) -> tuple[Choice | None, Counter[str]]:
 def feasible(context: Context, models: Models, index: int, postures: Array) -> Choice | str:
     """The grasp with its paths, or the first stage at which the most promising posture failed."""
     candidate: Candidate = context.plan.candidates[index]  # type: ignore[union-attr]
-    open_ = context.with_fingers(postures, candidate.opening)
-    free = models.open.free(open_)
+    open_ = context.with_fingers(postures, opened(context, candidate))
+    free = models.way.free(open_)
     if not free.any():
         return "arm or hand collides at the grasp"
     distance = np.abs(open_ - context.q)[:, context.joints].max(axis=1)
     furthest = "the approach is blocked"
     for q in open_[np.argsort(distance)]:
-        if not models.open.free(q):
+        if not models.way.free(q):
             continue
         T = context.robot.fk(q, context.hand.root)
-        back = line(context, models.open, q, T @ shift(-STANDOFF * approach_axis(candidate)))
+        back = line(context, models.way, q, T @ shift(-STANDOFF * approach_axis(candidate)))
         if back is None:
             continue
         held = np.asarray(np.linalg.inv(candidate.pose), dtype=np.float64)
-        closed = context.with_fingers(q, candidate.width)
-        up = line(context, models.supported(held), closed, shift([0.0, 0.0, LIFT]) @ T)
+        gripping = context.with_fingers(q, closed(context, candidate))
+        up = line(context, models.supported(held), gripping, shift([0.0, 0.0, LIFT]) @ T)
         if up is None:
             furthest = "the lift is blocked"
             continue
@@ -125,7 +131,7 @@ def feasible(context: Context, models: Models, index: int, postures: Array) -> C
         if down is None:
             furthest = "the place cannot be reached"
             continue
-        release = context.with_fingers(down[-1], candidate.opening)
+        release = context.with_fingers(down[-1], opened(context, candidate))
         T_place = context.robot.fk(release, context.hand.root)
         away = line(context, models.placed, release, T_place @ shift(-STANDOFF * approach_axis(candidate)))
         if away is None:

@@ -12,7 +12,7 @@ from ..arrays import Array
 from ..collision import CollisionModel, Scene
 from ..errors import InputError
 from ..kinematics import Hand, Robot
-from ..sim import Gripper, JointController, World
+from ..sim import Fingers, Gripper, JointController, World
 from .step import Observer
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class Context:
     observer: Observer
     hand: Hand
     arm: JointController
-    gripper: Gripper
+    gripper: Gripper | Fingers
     pose: Array | None = None
     covariance: Array | None = None
     plan: GraspPlan | None = None
@@ -63,7 +63,15 @@ class Context:
         world.record(RECORDING_RATE)
         hand = scene.hand
         arm = JointController(world, scene.robot.chain(hand.root))
-        return cls(scene, world, rng, observer or Observer(), hand, arm, Gripper(world, hand))
+        return cls(
+            scene,
+            world,
+            rng,
+            observer or Observer(),
+            hand,
+            arm,
+            Gripper(world, hand) if hand.is_jaw else Fingers(world, hand),
+        )
 
     @property
     def name(self) -> str:
@@ -107,10 +115,10 @@ class Context:
         assert self.choice is not None
         return self.choice
 
-    def with_fingers(self, q: Array, width: float) -> Array:
-        """*q* ``(..., n)`` with the fingers opened to *width*."""
+    def with_fingers(self, q: Array, joints: Array) -> Array:
+        """*q* ``(..., n)`` with the hand at *joints*."""
         out = np.array(q, copy=True)
-        out[..., self.fingers] = self.hand.jaw.q_at(width)
+        out[..., self.fingers] = joints
         return out
 
     @cached_property

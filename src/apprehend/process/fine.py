@@ -16,6 +16,7 @@ from .context import Context
 from .judge import angle
 from .locate import SEARCH, support
 from .motion import CAREFUL, along_path, execute
+from .posture import tcp
 from .step import Outcome
 
 WORTH = 3e-4
@@ -74,8 +75,7 @@ class Refine:
         )
 
     def _look(self, context: Context, guess: Array) -> LocateResult:
-        tcp = context.hand.jaw.tcp_at(context.chosen.candidate.opening)
-        mount = hand_camera(context.world, context.hand.root, tcp)
+        mount = hand_camera(context.world, context.hand.root, tcp(context, context.chosen.candidate))
         image = look(context.world, self.camera, mount, link=context.hand.root, noise=self.noise).image
         centre = guess[:3, :3] @ context.body.com + guess[:3, 3]
         region = np.array([centre - SEARCH, centre + SEARCH])

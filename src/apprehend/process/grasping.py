@@ -8,10 +8,11 @@ import numpy as np
 
 from .. import grasp
 from ..arrays import Array
-from ..sim import grip
+from ..sim import Gripper, grip
 from .choose import choose
 from .context import Context
 from .motion import ACCELERATION, in_hand
+from .posture import opened, spread
 from .step import Outcome
 
 GRASPS = 80
@@ -26,6 +27,12 @@ SAFETY = 1.5
 
 FORCE_FACTOR = 1.4
 """The grip is this many times what the planner computed to be needed, as far as the hand can press."""
+
+SLIP = 0.01
+"""Slip in m during the lift from which on another grasp is tried."""
+
+ARRIVED = 0.05
+"""Largest deviation of a finger joint from its pre-grasp, in rad."""
 
 
 @dataclass(frozen=True)
@@ -76,21 +83,21 @@ def support_plane(context: Context, T: Array) -> Array:
 
 @dataclass(frozen=True)
 class Preshape:
-    """Open the hand to the width of the pre-grasp."""
+    """Open the hand for the pre-grasp."""
 
     name: str = "preshape"
     title: str = "Open the hand"
 
     def run(self, context: Context) -> Outcome:
-        """Move the jaws by position."""
-        width = context.chosen.candidate.opening
-        context.gripper.move(context.world, width)
-        context.world.run(
-            OPEN_TIME, context.arm, context.gripper, until=lambda w: context.gripper.state.name == "ARRIVED"
-        )
-        reached = context.gripper.width(context.world)
-        ok = abs(reached - width) < 1e-3
-        return Outcome(ok, f"opened to {reached * 1e3:.1f} mm", {"width": width}, {"width": reached})
+        """Move the fingers by position."""
+        candidate = context.chosen.candidate
+        left = spread(context, candidate, OPEN_TIME)
+        inputs = {"width": candidate.opening, "joints": opened(context, candidate)}
+        if isinstance(context.gripper, Gripper):
+            width = context.gripper.width(context.world)
+            return Outcome(left < 1e-3, f"opened to {width * 1e3:.1f} mm", inputs, {"width": width})
+        told = f"the worst joint is {np.degrees(left):.1f}° from its pre-grasp"
+        return Outcome(left < ARRIVED, told, inputs, {"joints": context.gripper.positions(context.world)})
 
 
 @dataclass(frozen=True)
@@ -102,6 +109,7 @@ class Close:
 
     def run(self, context: Context) -> Outcome:
         """Grip."""
+        assert isinstance(context.gripper, Gripper)
         needed = context.chosen.candidate.required_force
         force = float(np.clip(FORCE_FACTOR * needed, 5.0, context.hand.jaw.max_force))
         result = grip(context.world, context.gripper, force, context.arm)
@@ -123,17 +131,15 @@ class Rate:
     name: str = "rate"
     title: str = "Rate the grasp"
 
-    SLIP = 0.01
-    """Slip in m during the lift from which on another grasp is tried."""
-
     def run(self, context: Context) -> Outcome:
         """Compare the pad forces with the command, and the object's pose in the hand with that at contact."""
+        assert isinstance(context.gripper, Gripper)
         one, two = context.gripper.pad_forces(context.world)
         wrench = context.world.contact_force(context.name, context.hand.robot.frame_names)
         weight = context.body.mass * context.scene.gravity
         if min(one, two) <= 0.0 or context.dropped:
             return Outcome(False, "the object is not in the hand any more", retry=True)
-        if context.slip > self.SLIP:
+        if context.slip > SLIP:
             return Outcome(False, f"the object slipped {context.slip * 1e3:.1f} mm while it was lifted", retry=True)
         context.held = in_hand(context)
         return Outcome(

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..collision import Scene
 from ..errors import InputError, unknown_name
+from ..kinematics import Hand
 from .context import Context
 from .episode import Episode, EpisodeStatus, StepRecord, StepStatus, Verdict
 from .export import recording_data, scene_data
 from .fine import Refine
+from .fingers import CloseFingers, RateFingers
 from .grasping import Close, PlanGrasp, Preshape, Rate
 from .judge import judge
 from .locate import Locate
@@ -36,19 +38,28 @@ class Process:
     again: str = "locate"
 
     @classmethod
-    def default(cls) -> Process:
-        """G 4's decomposition, from locating the object to letting go of it."""
-        return cls(
+    def default(cls, hand: Hand | None = None) -> Process:
+        """G 4's decomposition, from locating the object to letting go of it, for a jaw or for the fingers of *hand*.
+
+        Fingers take their pre-grasp far from the object, and close and are rated in their own way.
+        """
+        process = cls(
             (
                 Locate(), PlanGrasp(), Reach(), Preshape(), Refine(), Approach(), Close(), Lift(), Rate(),
                 Transport(), Place(), Release(), Retreat(),
             )
         )  # fmt: skip
+        if hand is None or hand.is_jaw:
+            return process
+        steps = list(process.replaced("close", CloseFingers()).replaced("rate", RateFingers()).steps)
+        reach = process.index("reach")
+        steps[reach : reach + 2] = Preshape(), Reach()
+        return replace(process, steps=tuple(steps))
 
     def replaced(self, name: str, step: Step) -> Process:
         """The process with *step* in the place of the step *name*."""
         self.index(name)
-        return Process(tuple(step if s.name == name else s for s in self.steps), self.commit, self.again)
+        return replace(self, steps=tuple(step if s.name == name else s for s in self.steps))
 
     def index(self, name: str) -> int:
         """Position of the step *name*."""
@@ -108,8 +119,8 @@ def pick_and_place(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"scene is {type(scene).__name__}; expected a Scene (Scene.load, Scene.tabletop)")
-    steps = process or Process.default()
     context = Context.begin(scene, np.random.default_rng(seed) if rng is None else rng, observer)
+    steps = process or Process.default(context.hand)
     records: list[StepRecord] = []
     marks: list[float] = []
     for record in steps.run(context):

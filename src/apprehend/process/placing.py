@@ -11,6 +11,7 @@ from ..arrays import Array
 from .choose import LIFT, Models, place_line, withdraw
 from .context import Context
 from .motion import CAREFUL, CARRYING, FREE, along_line, along_path, execute, in_hand
+from .posture import spread
 from .reaching import PLANNING_TIME, facts
 from .step import Outcome
 
@@ -102,10 +103,7 @@ class Release:
         """Open as far as for the approach."""
         context.arm.load = None
         before = context.world.body_pose(context.name)
-        context.gripper.move(context.world, context.chosen.candidate.opening)
-        context.world.run(
-            RELEASE_TIME, context.arm, context.gripper, until=lambda w: context.gripper.state.name == "ARRIVED"
-        )
+        spread(context, context.chosen.candidate, RELEASE_TIME)
         moved = float(np.linalg.norm(context.world.body_pose(context.name)[:3, 3] - before[:3, 3]))
         return Outcome(True, f"the object moved {moved * 1e3:.1f} mm", margins={"moved": moved})
 

@@ -7,6 +7,7 @@ import numpy as np
 from .choose import Models, withdraw
 from .context import Context
 from .motion import CAREFUL, along_line, execute
+from .posture import spread
 
 OPEN_TIME = 2.0
 
@@ -15,8 +16,7 @@ def back_off(context: Context) -> None:
     """Open the hand, retreat along the approach, and note the grasp as tried; locating and planning come again."""
     world, choice = context.world, context.chosen
     context.held, context.slip, context.dropped, context.arm.load = None, 0.0, False, None
-    context.gripper.move(world, choice.candidate.opening)
-    world.run(OPEN_TIME, context.arm, context.gripper, until=lambda w: context.gripper.state.name == "ARRIVED")
+    spread(context, choice.candidate, OPEN_TIME)
     models = Models(context, np.asarray(world.body_pose(context.name)))
     back = withdraw(context, models.open, choice.candidate)
     if back is not None:

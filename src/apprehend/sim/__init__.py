@@ -10,6 +10,7 @@
 from .camera import View, hand_camera, look
 from .contacts import ContactTable, Touch
 from .control import JointController, Load, Saturation
+from .fingers import CloseResult, CloseStatus, Fingers, FingerState, close_fingers
 from .grasps import Held, held, held_in, simulated
 from .gripper import Gripper, GripResult, GripStatus, JawState, grip
 from .model import Plant, build, specification, to_mujoco
@@ -18,7 +19,8 @@ from .record import Recording
 from .world import Controller, SettleResult, SettleStatus, World
 
 __all__ = [
-    "ContactTable", "Controller", "Gripper", "GripResult", "GripStatus", "Held", "JawState", "JointController", "Load",
-    "Physics", "Plant", "Recording", "Saturation", "SettleResult", "SettleStatus", "Touch", "View", "World", "build",
-    "grip", "hand_camera", "held", "held_in", "look", "simulated", "specification", "to_mujoco",
+    "CloseResult", "CloseStatus", "ContactTable", "Controller", "FingerState", "Fingers", "GripResult",
+    "GripStatus", "Gripper", "Held", "JawState", "JointController", "Load", "Physics", "Plant", "Recording",
+    "Saturation", "SettleResult", "SettleStatus", "Touch", "View", "World", "build", "close_fingers", "grip",
+    "hand_camera", "held", "held_in", "look", "simulated", "specification", "to_mujoco",
 ]  # fmt: skip
