@@ -188,7 +188,7 @@ def test_limits_bind_and_are_named():
     [
         ({"objective": "fastest"}, "objective is 'fastest'"),
         ({"objective": "min_torque"}, "needs limits.hand_jacobian"),
-        ({"limits": Limits(normal=-1.0)}, "limited below zero"),
+        ({"limits": Limits(normal=-1.0)}, "limits.normal is -1.0"),
         ({"limits": Limits(torque_upper=1.0)}, "without limits.hand_jacobian"),
         ({"limits": Limits(hand_jacobian=np.zeros((2, 2)))}, r"expected \(9, n\)"),
         (

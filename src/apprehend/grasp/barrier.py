@@ -58,7 +58,7 @@ def analytic_centre(
     forces[chosen], measures[chosen] = at, numbers
     e = -cone.EXTRAS
     status, decrement = out[:, e], measures[:, 1]
-    status[~found & (status != cone.INVALID)] = cone.INFEASIBLE
+    status[~found] = cone.INFEASIBLE
     status[found] = np.where(
         decrement < 0.0, cone.UNBOUNDED, np.where(decrement < 1e-4, cone.OPTIMAL, cone.INACCURATE)
     )[found]

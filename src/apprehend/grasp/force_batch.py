@@ -48,11 +48,23 @@ def optimal_forces(
         w = np.array(np.broadcast_to(w, (*many.shape, 6)), order="C").reshape(-1, 6)
     except ValueError:
         raise InputError(f"wrenches have shape {w.shape}; expected {(*many.shape, 6)}, one for each grasp") from None
+    if not len(many):
+        k, m = many.friction.shape[1], many.model.components
+        empty = np.zeros(many.shape)
+        return ForceBatch(
+            np.zeros((*many.shape, k * m)),
+            empty,
+            empty,
+            empty,
+            np.zeros((*many.shape, 6)),
+            empty.astype(np.int64),
+            empty,
+        )
     if len(many) < 2 or (many.model.components == 4 and not many.torsion.all()):
         found = [
             contact_forces(many.grasp(i), w[i : i + 1], objective, limits, weights=weight) for i in range(len(many))
         ]
-        return _joined([b for b in found if isinstance(b, ForceBatch)], many, w)
+        return _joined([b for b in found if isinstance(b, ForceBatch)], many)
     parts, template = [], Parts.of(many.grasp(0))
     for i in range(0, len(many), CHUNK):
         some = many[i : max(i + CHUNK, i + 2)]
@@ -62,7 +74,7 @@ def optimal_forces(
         for j in np.flatnonzero(program.weak).tolist():
             part.put(j, _alone(some, mine, j, objective, limits, weight))
         parts.append(part)
-    return _joined(parts, many, w)
+    return _joined(parts, many)
 
 
 def _alone(many: Many, w: Array, i: int, objective: str, limits: Limits, weights: Array | None) -> ForceBatch:
@@ -72,10 +84,9 @@ def _alone(many: Many, w: Array, i: int, objective: str, limits: Limits, weights
     return found
 
 
-def _joined(parts: list[ForceBatch], many: Many, w: Array) -> ForceBatch:
+def _joined(parts: list[ForceBatch], many: Many) -> ForceBatch:
     def whole(name: str) -> Array:
-        arrays = [getattr(p, name) for p in parts]
-        out: Array = np.concatenate(arrays) if arrays else np.zeros((0, w.shape[1]))
+        out: Array = np.concatenate([getattr(p, name) for p in parts])
         return out.reshape(many.shape + out.shape[1:])
 
     return ForceBatch(

@@ -23,6 +23,7 @@ RANK = 1e-11
 """Singular values of the balance rows below this share of the largest count as zero."""
 WEAK = 1e-6
 """Grasps in a batch, of whose balance rows less than this is independent, are solved one by one."""
+TOO_LARGE = "{} is too large to compute with; expected forces in N and moments in N m"
 TYPICAL = 1e-3
 """Forces are counted in units of the wrench, but at least of this share of the smallest limit."""
 
@@ -318,6 +319,9 @@ def answers(
         program.columns, program.right, wrenches, program.cones, program.kinds, program.floor, len(wrenches),
         start=start, share=share, chain=chain,
     )  # fmt: skip
+    invalid = (out[:, -kernel.EXTRAS] == kernel.INVALID) & ~program.weak  # those are solved one by one
+    if invalid.any():
+        raise InputError(TOO_LARGE.format(f"wrench {int(invalid.argmax())} of {len(wrenches)}"))
     if program.missed.shape[1]:
         refuse(program, wrenches, out)
     return out

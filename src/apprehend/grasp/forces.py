@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..arrays import Array, BoolArray, IntArray, as_shaped, as_vector, choice
 from ..errors import InputError
 from ..kernels import cone as kernel
 from ..result import Result, Status
-from .force_program import Parts, Program, answers, build, missed_direction, refuse
+from .force_program import TOO_LARGE, Parts, Program, answers, build, missed_direction, refuse
 from .limits import NO_LIMITS, Limits, check_limits
 from .program import MOST_STEPS
 
@@ -241,8 +242,8 @@ def _one(grasp: Grasp, program: Program, wrench: Array, start: ContactForces | N
     status = _CODES.get(int(code))
     if status is None:
         as_shaped(wrench, "wrench", grasp.wrench_size)  # raises: an entry is not finite
-        raise InputError("wrench is too large to compute with")
-    scale = program.unit * size**program.power
+        raise InputError(TOO_LARGE.format("wrench"))
+    scale = program.unit * (size**program.power if isfinite(primal) else 1.0)
     forces = program.maps[0].dot(answer[: columns.shape[1]])
     forces *= size if status is ForceStatus.OPTIMAL else 0.0
     return single(
@@ -282,7 +283,7 @@ def batch(
         one = len(program.maps) == 1  # einsum for the reason given in `force_program`
         forces = np.einsum("nj,ij->ni", x, program.maps[0]) if one else (program.maps @ x[..., None])[..., 0]
         forces *= np.where(codes == kernel.OPTIMAL, size, 0.0)[:, None]
-        scale = program.factor * size**program.power
+        scale = program.factor * np.where(np.isfinite(out[:, e + 1]), size**program.power, 1.0)
         residual = np.maximum(out[:, e + 3], out[:, e + 4])
         done = (forces, scale * out[:, e + 1], scale * out[:, e + 2], residual, out[:, e + 5])
     certificate = np.zeros((len(out), p))

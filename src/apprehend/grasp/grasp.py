@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +16,7 @@ from ..errors import InputError
 from ..kernels.hull_support import BOX, SAME
 from .ball import Generators
 from .closure import Closure, force_closure, form_closure
-from .contact import Contact, ContactModel
+from .contact import Contact, ContactModel, model_of
 from .forces import ContactForces, ForceBatch, contact_forces
 from .immobility import Immobility, immobility
 from .limits import Limits, with_torques
@@ -49,6 +50,12 @@ class Grasp:
         reference: ArrayLike | None = None,
         length: float | None = None,
     ) -> None:
+        if isinstance(contacts, Contact | Patch):
+            raise InputError("contacts is a single contact; expected a sequence of them: [contact]")
+        contacts = list(contacts)
+        for i, c in enumerate(contacts):
+            if not isinstance(c, Contact | Patch):
+                raise InputError(f"contacts[{i}] is a {type(c).__name__}; expected a Contact or a Patch")
         given = [c.contacts if isinstance(c, Patch) else (c,) for c in contacts]
         self.contacts = tuple(c for group in given for c in group)
         ends = np.cumsum([0, *map(len, given)]).tolist()
@@ -277,6 +284,8 @@ class Grasp:
         """
         if torque_limits is not None:
             limits = with_torques(limits, torque_limits, hand_jacobian)
+        elif hand_jacobian is not None:
+            limits = replace(limits or Limits(), hand_jacobian=hand_jacobian)
         return contact_forces(self, wrench, objective, limits, **options)
 
     def largest_force(self, direction: ArrayLike, limits: Limits, **options: Any) -> Push:
@@ -302,7 +311,5 @@ class Grasp:
         near, _, faces = surface.nearest(points)
         mu = body.friction if friction is None else friction
         gamma = body.torsional_friction if torsion is None else torsion
-        made = [
-            Contact(p, -surface.normals[f], mu, ContactModel(model), gamma) for p, f in zip(near, faces, strict=True)
-        ]
+        made = [Contact(p, -surface.normals[f], mu, model_of(model), gamma) for p, f in zip(near, faces, strict=True)]
         return cls(made, body)

@@ -37,10 +37,10 @@ NO_LIMITS = Limits()
 
 
 def check_limits(limits: Limits) -> None:
-    """Raise `InputError` for negative limits of normal forces."""
+    """Raise `InputError` for limits of normal forces that are negative or NaN."""
     for name, value in (("normal", limits.normal), ("total", limits.total)):
-        if value is not None and float(np.min(as_array(value, f"limits.{name}", finite=False))) < 0.0:
-            raise InputError(f"limits.{name} is {value}; a normal force cannot be limited below zero")
+        if value is not None and not (as_array(value, f"limits.{name}", finite=False) >= 0.0).all():
+            raise InputError(f"limits.{name} is {value}; expected numbers from zero on: it bounds a normal force")
 
 
 def with_torques(limits: Limits | None, torque_limits: ArrayLike, hand_jacobian: ArrayLike | None) -> Limits:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,6 +66,9 @@ def measure(grasp: Grasp, kind: str = "epsilon", **options: Any) -> Quality:
     calls: dict[str, Callable[..., Quality]] = {
         "epsilon": _epsilon, "volume": _volume, "mean_facet_distance": _mean, "task_ellipsoid": _task_ellipsoid,
     }  # fmt: skip
+    made = calls.get(kind) or MORE.get(kind)
+    if made is not None:
+        _check_options(kind, made, options)
     if kind in calls:
         return calls[kind](grasp, **options)
     if kind in MORE:
@@ -73,6 +77,17 @@ def measure(grasp: Grasp, kind: str = "epsilon", **options: Any) -> Quality:
         raise InputError(f"quality {kind!r} takes no options; got {', '.join(options)}")
     answer = _exact(kind, *PLAIN[kind](grasp))
     return replace(answer, upper=np.inf) if kind == "position_margin" else answer
+
+
+def _check_options(kind: str, made: Callable[..., Any], options: dict[str, Any]) -> None:
+    """Raise `InputError` for options that a quality lacks, or that it needs and were not given."""
+    known = {name: p for name, p in signature(made).parameters.items() if name != "grasp"}
+    for name in options:
+        if name not in known:
+            raise InputError(f"quality {kind!r} has no option {name!r}; it takes {', '.join(known) or 'none'}")
+    for name, parameter in known.items():
+        if parameter.default is parameter.empty and name not in options:
+            raise InputError(f"quality {kind!r} needs the option {name!r}")
 
 
 def _exact(kind: str, value: float, worst: Array) -> Quality:
