@@ -40,18 +40,6 @@ class Task(NamedTuple):
 
 
 @kernel(borrow=True)
-def passes(task, qa, qb, edge, space, tally):
-    """What becomes of the straight motion ``qa → qb``: `KEPT`, `BLOCKED` or `LEFT`."""
-    outcome = KEPT
-    if not holds(task.keep, qa, qb, space):
-        outcome = LEFT
-    elif edge_blocked(task.exact, task.lanes, qa, qb, task.scale[2], task.scale[3], edge):
-        outcome = BLOCKED
-    tally[outcome] += 1
-    return outcome
-
-
-@kernel(borrow=True)
 def distance(a, b):
     """Between two configurations."""
     total = 0.0
@@ -60,133 +48,159 @@ def distance(a, b):
     return math.sqrt(total)
 
 
+@kernel(inline=True)
+def passes(task, qa, qb, edge, space, tally):
+    """What becomes of the straight motion ``qa → qb``: `KEPT`, `BLOCKED` or `LEFT`."""
+    outcome = LEFT
+    if holds(task.keep, qa, qb, space):
+        outcome = KEPT
+        if edge_blocked(task.exact, task.lanes, qa, qb, task.scale[2], task.scale[3], edge):
+            outcome = BLOCKED
+    tally[outcome] += 1
+    return outcome
+
+
 @kernel(borrow=True)
+def step_towards(task, here, goal, far, stride, there, space):
+    """A configuration *there* on the constraint, a step nearer to *goal*; whether there is one."""
+    if far <= stride:
+        for j in range(goal.shape[0]):
+            there[j] = goal[j]
+        return True
+    for j in range(goal.shape[0]):
+        there[j] = here[j] + stride / far * (goal[j] - here[j])
+    return (
+        project_one(task.keep, there, task.lower, task.upper, space)
+        and distance(there, goal) <= far - NEARER * stride
+        and distance(there, here) <= 2.0 * stride
+    )
+
+
+@kernel(inline=True)
 def reach(task, nodes, parent, count, row, goal, edge, space, tally):
     """Grow from node *row* towards *goal*, step by step on the constraint: ``(new count, last node, outcome)``.
 
     Steps that leave the constraint are halved, and doubled again where they succeed.
     """
-    stride, n = task.scale[0], goal.shape[0]
-    while count < nodes.shape[0]:
-        here, there = nodes[row], nodes[count]
-        far = distance(here, goal)
-        if far == 0.0:
-            return count, row, REACHED
-        last = far <= stride
-        if last:
-            for j in range(n):
-                there[j] = goal[j]
-            outcome = passes(task, here, there, edge, space, tally)
-        else:
-            for j in range(n):
-                there[j] = here[j] + stride / far * (goal[j] - here[j])
-            if (
-                not project_one(task.keep, there, task.lower, task.upper, space)
-                or distance(there, goal) > far - NEARER * stride
-                or distance(there, here) > 2.0 * stride
-            ):
-                outcome = LEFT
-            else:
-                outcome = passes(task, here, there, edge, space, tally)
+    stride = task.scale[0]
+    far = distance(nodes[row], goal)
+    ended = NO_ROOM if far > 0.0 else REACHED
+    while count < nodes.shape[0] and far > 0.0:
+        outcome = LEFT
+        if step_towards(task, nodes[row], goal, far, stride, nodes[count], space):
+            outcome = passes(task, nodes[row], nodes[count], edge, space, tally)
+        stride = min(stride, far)
         if outcome == KEPT:
             parent[count] = row
             row = count
             count += 1
-            if last:
-                return count, row, REACHED
+            far = distance(nodes[row], goal)
             stride = min(2.0 * stride, task.scale[0])
-        elif outcome == LEFT and 0.5 * min(stride, far) >= task.scale[1]:
-            stride = 0.5 * min(stride, far)
+            if far == 0.0:
+                ended = REACHED
+        elif outcome == LEFT and 0.5 * stride >= task.scale[1]:
+            stride *= 0.5
         else:
-            return count, row, STOPPED
-    return count, row, NO_ROOM
+            ended = STOPPED
+            break
+    return count, row, ended
 
 
-@kernel
-def grow(task, nodes, parent, count, samples, tally):
+@kernel(inline=True)
+def grow(task, nodes, parent, count, samples, ends, tally, target, edge, space):
     """Grow both trees with the configurations of ``samples (S, n)``, the smaller tree first.
 
-    Returns ``(status, samples used, last node of either tree)``; when connected, these two are the same configuration.
+    Returns ``(status, samples used)``; when connected, ``ends (2,)`` are the last nodes of the trees: the same
+    configuration.
     """
-    n = samples.shape[1]
-    edge, space = edge_space(task.exact, task.lanes, n), constrain_space(task.keep, n)
-    target = np.empty(n)
-    for s in range(samples.shape[0]):
+    status, used = MORE, 0
+    while used < samples.shape[0] and status == MORE:
+        for j in range(target.shape[0]):
+            target[j] = samples[used, j]
+        used += 1
         one = 0 if count[0] <= count[1] else 1
-        other = 1 - one
-        for j in range(n):
-            target[j] = samples[s, j]
-        row, _ = nearest_node(nodes[one], count[one], target)
-        count[one], row, outcome = reach(task, nodes[one], parent[one], count[one], row, target, edge, space, tally)
-        if outcome == NO_ROOM:
-            return FULL, s + 1, 0, 0
-        for j in range(n):
-            target[j] = nodes[one, row, j]
-        met, _ = nearest_node(nodes[other], count[other], target)
-        count[other], met, outcome = reach(
-            task, nodes[other], parent[other], count[other], met, target, edge, space, tally
-        )
-        if outcome == REACHED:
-            return CONNECTED, s + 1, row if one == 0 else met, met if one == 0 else row
-        if outcome == NO_ROOM:
-            return FULL, s + 1, 0, 0
-    return MORE, samples.shape[0], 0, 0
+        for k in (one, 1 - one):
+            row, _ = nearest_node(nodes[k], count[k], target)
+            count[k], ends[k], outcome = reach(task, nodes[k], parent[k], count[k], row, target, edge, space, tally)
+            for j in range(target.shape[0]):
+                target[j] = nodes[k, ends[k], j]
+            if outcome == NO_ROOM:
+                status = FULL
+                break
+            if outcome == REACHED and k != one:
+                status = CONNECTED
+    return status, used
 
 
-@kernel(borrow=True)
+@kernel(inline=True)
 def thin(task, path, count, edge, space, tally):
     """Drop vertices that a straight motion can pass by, the farthest leaps first; the new count."""
-    n = path.shape[1]
     i, kept = 0, 1
     while i < count - 1:
         k = min(count - 1, i + LEAP)
         while k > i + 1 and passes(task, path[kept - 1], path[k], edge, space, tally) != KEPT:
             k -= 1
-        for j in range(n):
+        for j in range(path.shape[1]):
             path[kept, j] = path[k, j]
         kept += 1
         i = k
     return kept
 
 
-@kernel
-def shorten(task, path, count, samples, tally):
-    """Shorten ``path (C, n)`` of *count* vertices in place with pairs of random places ``samples (S, 2)`` in 0 … 1.
+@kernel(borrow=True)
+def replace(path, count, i, k, way, new, rest):
+    """Put ``way[:new]`` between the vertices *i* and *k* + 1 of a path; the new count."""
+    n, tail = path.shape[1], count - (k + 1)
+    for r in range(tail):
+        for j in range(n):
+            rest[r, j] = path[k + 1 + r, j]
+    for r in range(new):
+        for j in range(n):
+            path[i + 1 + r, j] = way[r, j]
+    for r in range(tail):
+        for j in range(n):
+            path[i + 1 + new + r, j] = rest[r, j]
+    return i + 1 + new + tail
+
+
+@kernel(inline=True)
+def shorten(task, path, count, pairs, way, rest, parent, goal, edge, space, tally):
+    """Shorten ``path (C, n)`` of *count* vertices in place with pairs of random places ``pairs (S, 2)`` in 0 … 1.
 
     Ways on the constraint from one place to the other replace what lies between where they are shorter. The new count.
     """
-    n = path.shape[1]
-    edge, space = edge_space(task.exact, task.lanes, n), constrain_space(task.keep, n)
-    way, rest, parent = np.empty_like(path), np.empty_like(path), np.zeros(path.shape[0], np.int64)
-    b = np.empty(n)
-    count = thin(task, path, count, edge, space, tally)
-    vain = 0
-    for s in range(samples.shape[0]):
-        vain += 1
-        if count < 3 or vain > PATIENCE:
-            break
+    vain = s = 0
+    while s < pairs.shape[0] and count > 2 and vain < PATIENCE:
         total = length(path, 0, count - 1)
-        low = min(samples[s, 0], samples[s, 1]) * total
-        high = max(samples[s, 0], samples[s, 1]) * total
+        low, high = min(pairs[s, 0], pairs[s, 1]) * total, max(pairs[s, 0], pairs[s, 1]) * total
+        s += 1
+        vain += 1
         i = point_at(path, count, low, way[0])
-        k = point_at(path, count, high, b)
+        k = point_at(path, count, high, goal)
         if i == k:
             continue
-        new, _, outcome = reach(task, way, parent, 1, 0, b, edge, space, tally)
-        if outcome != REACHED or length(way, 0, new - 1) > (high - low) * (1.0 - 1e-3):
-            continue
-        tail = count - (k + 1)
-        if i + 1 + new + tail > path.shape[0]:
-            continue
-        vain = 0
-        for r in range(tail):
-            for j in range(n):
-                rest[r, j] = path[k + 1 + r, j]
-        for r in range(new):
-            for j in range(n):
-                path[i + 1 + r, j] = way[r, j]
-        for r in range(tail):
-            for j in range(n):
-                path[i + 1 + new + r, j] = rest[r, j]
-        count = i + 1 + new + tail
-    return thin(task, path, count, edge, space, tally)
+        new, _, outcome = reach(task, way, parent, 1, 0, goal, edge, space, tally)
+        if outcome == REACHED and length(way, 0, new - 1) < (high - low) * (1.0 - 1e-3):
+            if new + count + i - k <= path.shape[0]:
+                count = replace(path, count, i, k, way, new, rest)
+                vain = 0
+    return count
+
+
+@kernel
+def search(task, nodes, parent, count, samples, path, pairs, ends, tally):
+    """`grow` the trees if there are *samples*, else shorten ``path`` of ``count[0]`` vertices with *pairs*.
+
+    One kernel for both: what checks a motion takes long to compile.
+    """
+    n = path.shape[1]
+    edge, space = edge_space(task.exact, task.lanes, n), constrain_space(task.keep, n)
+    target = np.empty(n)
+    if samples.shape[0] > 0:
+        return grow(task, nodes, parent, count, samples, ends, tally, target, edge, space)
+    way, rest, parents, vertices = np.empty_like(path), np.empty_like(path), np.zeros(path.shape[0], np.int64), count[0]
+    for last in range(2):
+        vertices = thin(task, path, vertices, edge, space, tally)
+        if last == 0:
+            vertices = shorten(task, path, vertices, pairs, way, rest, parents, target, edge, space, tally)
+    return MORE, vertices

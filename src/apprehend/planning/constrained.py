@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..collision import CollisionModel
 from ..kernels import collide_plan, constrain_plan
 from .keeping import Constraints
@@ -19,6 +19,8 @@ FIRST_ROOM = 512
 
 PORTION = 64
 """Random configurations between looks at the clock."""
+
+NOTHING = np.empty((0, 2))
 
 
 class ConstrainedSearch:
@@ -56,17 +58,12 @@ class ConstrainedSearch:
         """A path and the number of its goal, or None when the time is over or the trees are full."""
         near = int(((self.nodes[1, : self.count[1]] - self.nodes[0, 0]) ** 2).sum(axis=1).argmin())
         samples = self.nodes[1, near][None].copy()  # the first way is that towards the nearest goal
+        ends = np.zeros(2, np.int64)
         while True:
-            began, known = time.perf_counter(), len(constrain_plan.grow.overloads)
-            status, used, *ends = constrain_plan.grow(
-                self.task, self.nodes, self.parent, self.count, samples, self.tally
-            )
-            if len(constrain_plan.grow.overloads) > known:
-                self.compiling += time.perf_counter() - began
-            self.samples += int(used)
+            status, used = self._run(self.count, samples, self.nodes[0], NOTHING, ends)
+            self.samples += used
             if status == collide_plan.CONNECTED:
-                halves = [self._way(k, int(ends[k])) for k in (0, 1)]
-                (a, _), (b, root) = halves
+                (a, _), (b, root) = (self._way(k, int(ends[k])) for k in (0, 1))
                 return np.concatenate([a[::-1], b[1:]]), root
             full = status == collide_plan.FULL
             if full and self.nodes.shape[1] < self.most:
@@ -74,6 +71,24 @@ class ConstrainedSearch:
             elif full or time.perf_counter() - self.compiling > until:
                 return None
             samples = rng.uniform(self.low, self.high, (PORTION, len(self.low)))
+
+    def shorten(self, path: Array, rng: np.random.Generator, tries: int) -> Array:
+        """Random ways on the constraint, where they are shorter than what they replace."""
+        room = np.empty((4 * len(path) + 64, path.shape[1]))
+        room[: len(path)] = path
+        count = np.array([len(path), 0], np.int64)
+        none = np.empty((0, path.shape[1]))
+        _, left = self._run(count, none, room, rng.uniform(size=(tries, 2)), np.zeros(2, np.int64))
+        return room[:left].copy()
+
+    def _run(self, count: IntArray, samples: Array, path: Array, pairs: Array, ends: IntArray) -> tuple[int, int]:
+        began, known = time.perf_counter(), len(constrain_plan.search.overloads)
+        status, number = constrain_plan.search(
+            self.task, self.nodes, self.parent, count, samples, path, pairs, ends, self.tally
+        )
+        if len(constrain_plan.search.overloads) > known:
+            self.compiling += time.perf_counter() - began
+        return int(status), int(number)
 
     @property
     def full(self) -> bool:
@@ -92,10 +107,3 @@ class ConstrainedSearch:
         nodes, parent = np.empty((2, room, self.nodes.shape[2])), np.full((2, room), -1, np.int64)
         nodes[:, :old], parent[:, :old] = self.nodes, self.parent
         self.nodes, self.parent = nodes, parent
-
-    def shorten(self, path: Array, rng: np.random.Generator, tries: int) -> Array:
-        """Random ways on the constraint, where they are shorter than what they replace."""
-        room = np.empty((4 * len(path) + 64, path.shape[1]))
-        room[: len(path)] = path
-        count = constrain_plan.shorten(self.task, room, len(path), rng.uniform(size=(tries, 2)), self.tally)
-        return room[:count].copy()
