@@ -62,14 +62,20 @@ def cache_dir(path: Path) -> Path:
 
 
 def kernel(
-    function: Callable[..., object] | None = None, *, inline: bool = False, fast: bool = True, borrow: bool = False
+    function: Callable[..., object] | None = None,
+    *,
+    inline: bool = False,
+    fast: bool = True,
+    borrow: bool = False,
+    splice: bool = False,
 ) -> Any:
     """Compile *function* lazily with Numba, cached on disk, releasing the GIL.
 
     *inline* splices the body into its callers (for small helpers in lane loops); *fast* = False keeps strict IEEE
     order of operations (for code whose last bits matter, such as exp and log near their edges). *borrow* is for what
     runs once per block, and neither makes nor returns an array: it counts no references to its arguments. (Each count
-    is an atomic operation on a cache line that all threads share; two threads then hinder each other.)
+    is an atomic operation on a cache line that all threads share; two threads then hinder each other.) *splice* has
+    the machine code spliced into its callers: for small helpers with many arguments, which a call would copy.
     """
 
     def wrap(f: Callable[..., object]) -> Any:
@@ -83,6 +89,7 @@ def kernel(
                 fastmath=FAST if fast else False,
                 inline="always" if inline else "never",
                 _nrt=not borrow,
+                forceinline=splice,
             )(f)
         finally:
             config.CACHE_DIR = before

@@ -15,11 +15,36 @@ from ._jit import kernel
 from .collide import make_space
 from .lane_exact import QUEUE, EdgeSpace, settle
 from .lanes import LANES
-from .sphere import carry_point, count_flags, hit_lanes, move_lanes, ready_node, sphere_space
-from .sphere_near import HALF_SPACE, at, near_fixed, near_grid, near_sphere
+from .sphere import (
+    come_first,
+    count_flags,
+    hit_lanes,
+    mark_fixed,
+    mark_selves,
+    move_lanes,
+    near_nodes,
+    ready_ball,
+    sphere_space,
+)
+from .sphere_near import HALF_SPACE, at, near_node
 
 DEEP = QUEUE - 1024
 """With more pieces than this the last ones come first, so that the queue never overflows."""
+
+
+@kernel
+def motion_weights(model):
+    """What each joint adds to the rates of `motion_rates`, per unit of its speed."""
+    nodes, selves = model.nodes, model.selves
+    m, B, K = model.links.shape[0], selves.shape[0], nodes.shape[0]
+    weights = np.zeros((m, B + K))
+    for i in range(m):
+        for p in range(B):
+            if selves[p, 2 + i] == 0:
+                weights[i, p] = nodes[selves[p, 0], 5 + i] + nodes[selves[p, 1], 5 + i]
+        for k in range(K):
+            weights[i, B + k] = nodes[k, 5 + i]
+    return weights
 
 
 @kernel
@@ -28,32 +53,24 @@ def edge_space(exact, lanes, n):
     K, m, B = lanes.parts.shape[0], lanes.links.shape[0], lanes.selves.shape[0]
     return EdgeSpace(
         make_space(exact), sphere_space(lanes, n), np.empty((K, 4)), np.zeros(LANES), np.zeros(LANES),
-        np.zeros(B + K), np.empty(m), np.zeros(1), np.empty((QUEUE, 2)), np.arange(lanes.meets.shape[0]),
+        np.zeros(B + K), np.empty(m), np.zeros(1), np.empty((QUEUE, 2)), motion_weights(lanes),
     )  # fmt: skip
 
 
 @kernel(borrow=True)
-def motion_rates(model, qa, qb, rates, speed, turning):
+def motion_rates(model, qa, qb, space):
     """How fast pairs of nodes, and nodes and the world, can approach along ``qa → qb``, per unit of the motion."""
-    links, joints, nodes, selves = model.links, model.joints, model.nodes, model.selves
-    m, B = links.shape[0], selves.shape[0]
-    turning[0] = 0.0
-    for i in range(m):
+    links, joints, weights, rates, speed = model.links, model.joints, space.weights, space.rates, space.speed
+    turning = 0.0
+    rates[:] = 0.0
+    for i in range(links.shape[0]):
         speed[i] = joints[i, 12] * (qb[links[i, 2]] - qa[links[i, 2]])
-        if links[i, 1] == 0:
-            turning[0] += abs(speed[i])
-    for p in range(B):
-        a, b = selves[p, 0], selves[p, 1]
-        total = 0.0
-        for i in range(m):
-            if selves[p, 2 + i] == 0:
-                total += abs(speed[i]) * (nodes[a, 5 + i] + nodes[b, 5 + i])
-        rates[p] = total
-    for k in range(nodes.shape[0]):
-        total = 0.0
-        for i in range(m):
-            total += abs(speed[i]) * nodes[k, 5 + i]
-        rates[B + k] = total
+        s = abs(speed[i])
+        if s > 0.0:
+            turning += s if links[i, 1] == 0 else 0.0
+            for p in range(rates.shape[0]):
+                rates[p] += s * weights[i, p]
+    space.turning[0] = turning
 
 
 @kernel(borrow=True)
@@ -91,51 +108,6 @@ def clear_marks(flags):
 
 
 @kernel(borrow=True)
-def marked_fixed(lanes, space, k, o, rate, margin, resolution):
-    """Mark the lanes in which spheres of node *k* may meet fixed shape *o*; whether there are any."""
-    parts, spheres, nodes, fixed, own = lanes.parts, lanes.spheres, lanes.nodes, lanes.fixed, space.lanes
-    flags, balls, centres = own.flags, own.balls, own.centres
-    grid = fixed[o, 16] >= HALF_SPACE
-    radius = nodes[k, 3] + margin
-    if grid:
-        near = near_grid(lanes, o, balls, k, radius, rate, resolution, flags, False)
-    else:
-        near = near_fixed(fixed, o, balls, k, radius, rate, resolution, flags, False)
-    if not near:
-        return False
-    ready_node(parts, spheres, own.poses, centres, own.ready, k)
-    clear_marks(flags)
-    near = False
-    for s in range(parts[k, 1], parts[k, 2]):
-        radius = spheres[s, 3] + margin
-        if grid:
-            near |= near_grid(lanes, o, centres, s, radius, rate, resolution, flags, True)
-        else:
-            near |= near_fixed(fixed, o, centres, s, radius, rate, resolution, flags, True)
-    return near
-
-
-@kernel(borrow=True)
-def marked_selves(lanes, space, a, b, rate, margin, resolution):
-    """As `marked_fixed`, for the spheres of two moving nodes."""
-    parts, spheres, nodes, own = lanes.parts, lanes.spheres, lanes.nodes, space.lanes
-    flags, balls, centres, poses = own.flags, own.balls, own.centres, own.poses
-    if not near_sphere(balls, a, balls, b, nodes[a, 3] + nodes[b, 3] + margin, rate, resolution, flags, False):
-        return False
-    ready_node(parts, spheres, poses, centres, own.ready, a)
-    ready_node(parts, spheres, poses, centres, own.ready, b)
-    clear_marks(flags)
-    near = False
-    for i in range(parts[a, 1], parts[a, 2]):
-        radius = spheres[i, 3] + nodes[b, 3] + margin
-        if near_sphere(centres, i, balls, b, radius, rate, resolution, flags, False):
-            for j in range(parts[b, 1], parts[b, 2]):
-                radius = spheres[i, 3] + spheres[j, 3] + margin
-                near |= near_sphere(centres, i, centres, j, radius, rate, resolution, flags, True)
-    return near
-
-
-@kernel(borrow=True)
 def note(state, flags):
     """Merge the marks of a pair whose spheres are exact into the state of the lanes; whether any lane is hit."""
     hit = 0.0
@@ -148,50 +120,55 @@ def note(state, flags):
 @kernel(borrow=True)
 def block_hit(model, lanes, space, margin, resolution):
     """Whether any lane hits something; if not, ``state`` says which pieces are open."""
-    parts, nodes, owns, own = lanes.parts, lanes.nodes, lanes.owns, space.lanes
+    nodes, owns, own = lanes.nodes, lanes.owns, space.lanes
     meets, selves, exactly, fixed = lanes.meets, lanes.selves, lanes.exactly, lanes.fixed
-    flags, state, order, bounds, rates = own.flags, space.state, space.order, space.bounds, space.rates
-    B = selves.shape[0]
+    flags, state, order, bounds, rates = own.flags, space.state, own.order, space.bounds, space.rates
+    B, C = selves.shape[0], meets.shape[0]
     move_lanes(lanes.links, lanes.joints, own.q, own.poses)
     widest = 0.0
     for lane in range(LANES):
         widest = max(widest, flags[2 * LANES + lane])
         state[lane] = 0.0
-    for k in range(parts.shape[0]):
+    for k in range(nodes.shape[0]):
         own.ready[k] = 0
-        carry_point(own.poses, parts[k, 0], nodes[k, 0], nodes[k, 1], nodes[k, 2], own.balls, k)
+        ready_ball(lanes, own, k)
         bound(own.balls, k, nodes[k, 3] + margin, bounds)
-    for i in range(meets.shape[0]):
+    for i in range(B + C):
         c = order[i]
-        k, o = meets[c, 0], meets[c, 1]
-        rate = rates[B + k]
-        if fixed[o, 16] < HALF_SPACE and not may_meet(bounds, k, fixed, o, rate * widest):
-            continue
-        if not marked_fixed(lanes, space, k, o, rate, margin, resolution):
-            continue
-        if exactly[c]:
-            touch = note(state, flags)
+        if c < C:
+            k, o = meets[c, 0], meets[c, 1]
+            rate = rates[B + k]
+            if fixed[o, 16] < HALF_SPACE and not may_meet(bounds, k, fixed, o, rate * widest):
+                continue
+            if not near_node(lanes, own, k, o, rate, margin, resolution):
+                continue
+            clear_marks(flags)
+            if not mark_fixed(lanes, own, k, o, rate, margin, resolution):
+                continue
+            if exactly[c]:
+                touch = note(state, flags)
+            else:
+                count = owns[k, 1] - owns[k, 0]
+                first, stride = meets[c, 2], meets[c, 3]
+                touch = settle(model, lanes, space, k, -1, -1, first, stride, count, margin, rate, resolution)
         else:
-            count = owns[k, 1] - owns[k, 0]
-            first, stride = meets[c, 2], meets[c, 3]
-            touch = settle(model, lanes, space, k, -1, -1, first, stride, count, margin, rate, resolution)
+            p = c - C
+            a, b = selves[p, 0], selves[p, 1]
+            rate = rates[p]
+            x, y, z = bounds[a, 0] - bounds[b, 0], bounds[a, 1] - bounds[b, 1], bounds[a, 2] - bounds[b, 2]
+            r = bounds[a, 3] + bounds[b, 3] + rate * widest
+            if x * x + y * y + z * z > r * r or not near_nodes(lanes, own, a, b, rate, margin, resolution):
+                continue
+            clear_marks(flags)
+            if not mark_selves(lanes, own, a, b, rate, margin, resolution):
+                continue
+            if exactly[c]:
+                touch = note(state, flags)
+            else:
+                first, count = lanes.ranges[p, 0], lanes.ranges[p, 1] - lanes.ranges[p, 0]
+                touch = settle(model, lanes, space, a, b, p, first, 1, count, margin, rate, resolution)
         if touch:
-            if i > 0:
-                order[i], order[i - 1] = order[i - 1], c
-            return True
-    for p in range(B):
-        a, b = selves[p, 0], selves[p, 1]
-        rate = rates[p]
-        x, y, z = bounds[a, 0] - bounds[b, 0], bounds[a, 1] - bounds[b, 1], bounds[a, 2] - bounds[b, 2]
-        r = bounds[a, 3] + bounds[b, 3] + rate * widest
-        if x * x + y * y + z * z > r * r or not marked_selves(lanes, space, a, b, rate, margin, resolution):
-            continue
-        if exactly[meets.shape[0] + p]:
-            touch = note(state, flags)
-        else:
-            first, count = lanes.ranges[p, 0], lanes.ranges[p, 1] - lanes.ranges[p, 0]
-            touch = settle(model, lanes, space, a, b, p, first, 1, count, margin, rate, resolution)
-        if touch:
+            come_first(order, i)
             return True
     return False
 
@@ -225,7 +202,7 @@ def edge_blocked(exact, lanes, qa, qb, margin, resolution, space):
     Pieces that are not certainly free are cut in two, down to movements of *resolution*; the coarse ones come first,
     since a hit ends the check.
     """
-    motion_rates(lanes, qa, qb, space.rates, space.speed, space.turning)
+    motion_rates(lanes, qa, qb, space)
     queue, q, middle, half = space.queue, space.lanes.q, space.middle, space.lanes.flags[2 * LANES : 3 * LANES]
     decides = lanes.decides[0] == 1
     state = space.lanes.flags[LANES : 2 * LANES] if decides else space.state

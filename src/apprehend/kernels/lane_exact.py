@@ -32,7 +32,7 @@ class EdgeSpace(NamedTuple):
     speed: np.ndarray  # (m,): of the joints along the motion
     turning: np.ndarray  # (1,): sum of what revolute joints turn
     queue: np.ndarray  # (QUEUE, 2): begin and end of pieces
-    order: np.ndarray  # (C,) int64: rows of ``meets``, the more often hit the earlier
+    weights: np.ndarray  # (m, B + K): how fast pairs of nodes, and nodes and the world, can approach, per joint
 
 
 @kernel(borrow=True)

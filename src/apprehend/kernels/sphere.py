@@ -16,8 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .lanes import LANES, sincos
-from .sphere_near import HALF_SPACE, at, near_fixed, near_grid, near_sphere
+from .lanes import LANES
+from .sphere_near import BOX, CYLINDER, at, mark_near, near, near_node, to_box, to_cylinder, to_grid, to_spheres
+from .vector import floor, load, select, some, store
 
 
 class SphereModel(NamedTuple):
@@ -49,7 +50,8 @@ class SphereSpace(NamedTuple):
     balls: np.ndarray  # 3 K
     centres: np.ndarray  # 3 S
     flags: np.ndarray  # 4 rows of LANES: hard hits, soft hits, half width of the pieces, scratch
-    ready: np.ndarray  # (K,) int64: whether the centres of a node are in place
+    ready: np.ndarray  # (K,) int64: what is in place of a node: 0 nothing, 1 the ball around it, 2 its spheres
+    order: np.ndarray  # (C + B,) int64: rows of ``meets``, and C + rows of ``selves``: what was hit last comes first
 
 
 @kernel
@@ -67,55 +69,68 @@ def sphere_space(model, n):
         np.empty(3 * S * LANES),
         np.zeros(4 * LANES),
         np.zeros(K, np.int64),
+        np.arange(model.meets.shape[0] + model.selves.shape[0]),
     )
+
+
+@kernel(borrow=True, splice=True)
+def sine_cosine(x):
+    """As `lanes.sincos`, of sixteen angles in registers."""
+    k = floor(x * 0.6366197723675814 + 0.5)
+    r = x - k * 1.5707963267341256
+    r = r - k * 6.077100506303966e-11
+    r = r - k * 2.0222662487959506e-21
+    z = r * r
+    s = z * 1.58969099521155010221e-10 + -2.50507602534068634195e-08
+    s = s * z + 2.75573137070700676789e-06
+    s = s * z + -1.98412698298579493134e-04
+    s = s * z + 8.33333333332248946124e-03
+    s = s * z + -1.66666666666666324348e-01
+    s = r + r * z * s
+    c = z * -1.13596475577881948265e-11 + 2.08757232129817482790e-09
+    c = c * z + -2.75573143513906633035e-07
+    c = c * z + 2.48015872894767294178e-05
+    c = c * z + -1.38888888888741095749e-03
+    c = c * z + 4.16666666666666019037e-02
+    c = 1.0 - 0.5 * z + z * z * c
+    half = floor(0.5 * k)
+    odd = k - 2.0 * half
+    sign = 1.0 - 2.0 * (half - 2.0 * floor(0.5 * half))
+    swap = odd > 0.5
+    return sign * select(swap, c, s), sign * (1.0 - 2.0 * odd) * select(swap, s, c)
 
 
 @kernel(borrow=True)
 def turn_lanes(joint, q, d, P, T):
     """Frames ``T (12 LANES,)`` of a revolute joint from those of its parent; its values are in ``q`` from *d* on."""
     L = LANES
-    m, o = joint[12], joint[13]
-    a0, a1, a2, a3, a4, a5 = joint[0], joint[1], joint[2], joint[3], joint[4], joint[5]
-    a6, a7, a8, x, y, z = joint[6], joint[7], joint[8], joint[9], joint[10], joint[11]
-    for lane in range(L):
-        s, c = sincos(m * q[d + lane] + o)
-        p0, p1, p2 = P[lane], P[L + lane], P[2 * L + lane]
-        u, v = p0 * a0 + p1 * a3 + p2 * a6, p0 * a1 + p1 * a4 + p2 * a7
-        T[lane] = u * c + v * s
-        T[L + lane] = v * c - u * s
-        T[2 * L + lane] = p0 * a2 + p1 * a5 + p2 * a8
-        T[9 * L + lane] = P[9 * L + lane] + p0 * x + p1 * y + p2 * z
-        p0, p1, p2 = P[3 * L + lane], P[4 * L + lane], P[5 * L + lane]
-        u, v = p0 * a0 + p1 * a3 + p2 * a6, p0 * a1 + p1 * a4 + p2 * a7
-        T[3 * L + lane] = u * c + v * s
-        T[4 * L + lane] = v * c - u * s
-        T[5 * L + lane] = p0 * a2 + p1 * a5 + p2 * a8
-        T[10 * L + lane] = P[10 * L + lane] + p0 * x + p1 * y + p2 * z
-        p0, p1, p2 = P[6 * L + lane], P[7 * L + lane], P[8 * L + lane]
-        u, v = p0 * a0 + p1 * a3 + p2 * a6, p0 * a1 + p1 * a4 + p2 * a7
-        T[6 * L + lane] = u * c + v * s
-        T[7 * L + lane] = v * c - u * s
-        T[8 * L + lane] = p0 * a2 + p1 * a5 + p2 * a8
-        T[11 * L + lane] = P[11 * L + lane] + p0 * x + p1 * y + p2 * z
+    s, c = sine_cosine(joint[12] * load(q, d) + joint[13])
+    for k in range(3):
+        r = 3 * k * L
+        p0, p1, p2 = load(P, r), load(P, r + L), load(P, r + 2 * L)
+        u = p0 * joint[0] + p1 * joint[3] + p2 * joint[6]
+        v = p0 * joint[1] + p1 * joint[4] + p2 * joint[7]
+        t = (9 + k) * L
+        store(T, r, u * c + v * s)
+        store(T, r + L, v * c - u * s)
+        store(T, r + 2 * L, p0 * joint[2] + p1 * joint[5] + p2 * joint[8])
+        store(T, t, load(P, t) + p0 * joint[9] + p1 * joint[10] + p2 * joint[11])
 
 
 @kernel(borrow=True)
 def slide_lanes(joint, q, d, P, T):
     """As `turn_lanes`, for a prismatic joint."""
     L = LANES
-    m, o = joint[12], joint[13]
-    a0, a1, a2, a3, a4, a5 = joint[0], joint[1], joint[2], joint[3], joint[4], joint[5]
-    a6, a7, a8, x, y, z = joint[6], joint[7], joint[8], joint[9], joint[10], joint[11]
+    slide = joint[12] * load(q, d) + joint[13]
     for k in range(3):
         r = 3 * k * L
-        for lane in range(L):
-            p0, p1, p2 = P[r + lane], P[r + L + lane], P[r + 2 * L + lane]
-            w = p0 * a2 + p1 * a5 + p2 * a8
-            T[r + lane] = p0 * a0 + p1 * a3 + p2 * a6
-            T[r + L + lane] = p0 * a1 + p1 * a4 + p2 * a7
-            T[r + 2 * L + lane] = w
-            moved = P[(9 + k) * L + lane] + p0 * x + p1 * y + p2 * z
-            T[(9 + k) * L + lane] = moved + (m * q[d + lane] + o) * w
+        p0, p1, p2 = load(P, r), load(P, r + L), load(P, r + 2 * L)
+        w = p0 * joint[2] + p1 * joint[5] + p2 * joint[8]
+        t = (9 + k) * L
+        store(T, r, p0 * joint[0] + p1 * joint[3] + p2 * joint[6])
+        store(T, r + L, p0 * joint[1] + p1 * joint[4] + p2 * joint[7])
+        store(T, r + 2 * L, w)
+        store(T, t, load(P, t) + p0 * joint[9] + p1 * joint[10] + p2 * joint[11] + slide * w)
 
 
 @kernel(borrow=True)
@@ -129,28 +144,37 @@ def move_lanes(links, joints, q, poses):
             slide_lanes(joints[i], q, at(links[i, 2], 1), poses[p], poses[i])
 
 
-@kernel(borrow=True)
+@kernel(borrow=True, splice=True)
 def carry_point(poses, carrier, x, y, z, out, k):
     """Point (x, y, z) of the moved frame *carrier* (−1: the world) into components 3k … 3k + 2 of *out*."""
     L = LANES
     P, t = poses[carrier], at(k, 3)
     for c in range(3):
         r = 3 * c * L
-        for lane in range(L):
-            moved = P[r + lane] * x + P[r + L + lane] * y + P[r + 2 * L + lane] * z
-            out[t + c * L + lane] = moved + P[(9 + c) * L + lane]
+        moved = load(P, r) * x + load(P, r + L) * y + load(P, r + 2 * L) * z
+        store(out, t + c * L, moved + load(P, (9 + c) * L))
 
 
-@kernel(borrow=True)
-def ready_node(parts, spheres, poses, centres, ready, k):
+@kernel(borrow=True, splice=True)
+def ready_ball(model, own, k):
+    """Put the ball around node *k* in place, once per block."""
+    if own.ready[k] == 0:
+        own.ready[k] = 1
+        parts, nodes = model.parts, model.nodes
+        carry_point(own.poses, parts[k, 0], nodes[k, 0], nodes[k, 1], nodes[k, 2], own.balls, k)
+
+
+@kernel(borrow=True, splice=True)
+def ready_node(model, own, k):
     """Put the spheres of node *k* in place, once per block."""
-    if ready[k] == 0:
-        ready[k] = 1
+    if own.ready[k] < 2:
+        own.ready[k] = 2
+        parts, spheres = model.parts, model.spheres
         for s in range(parts[k, 1], parts[k, 2]):
-            carry_point(poses, parts[k, 0], spheres[s, 0], spheres[s, 1], spheres[s, 2], centres, s)
+            carry_point(own.poses, parts[k, 0], spheres[s, 0], spheres[s, 1], spheres[s, 2], own.centres, s)
 
 
-@kernel(borrow=True)
+@kernel(borrow=True, splice=True)
 def count_flags(flags, row):
     """Number of lanes with a flag."""
     total = 0.0
@@ -159,54 +183,92 @@ def count_flags(flags, row):
     return int(total)
 
 
+@kernel(borrow=True, splice=True)
+def mark_fixed(model, own, k, o, rate, margin, resolution):
+    """Mark the lanes in which spheres of node *k* are near fixed shape *o*; whether there are any."""
+    parts, spheres, fixed, flags, centres = model.parts, model.spheres, model.fixed, own.flags, own.centres
+    ready_node(model, own, k)
+    found = False
+    first, end = parts[k, 1], parts[k, 2]
+    grown = margin + fixed[o, 15]
+    if fixed[o, 16] == BOX:
+        for s in range(first, end):
+            found |= mark_near(to_box(fixed, o, centres, s), spheres[s, 3] + grown, rate, resolution, flags)
+    elif fixed[o, 16] == CYLINDER:
+        for s in range(first, end):
+            found |= mark_near(to_cylinder(fixed, o, centres, s), spheres[s, 3] + grown, rate, resolution, flags)
+    else:
+        for s in range(first, end):
+            to_grid(model, o, centres, s, flags)
+            found |= mark_near(load(flags, 3 * LANES), spheres[s, 3] + margin, rate, resolution, flags)
+    return found
+
+
+@kernel(borrow=True, splice=True)
+def near_nodes(model, own, a, b, rate, margin, resolution):
+    """Whether the balls around two moving nodes may be near one another in any lane."""
+    ready_ball(model, own, a)
+    ready_ball(model, own, b)
+    radius = model.nodes[a, 3] + model.nodes[b, 3] + margin
+    return some(near(to_spheres(own.balls, a, own.balls, b), radius, rate, resolution, own.flags))
+
+
+@kernel(borrow=True, splice=True)
+def mark_selves(model, own, a, b, rate, margin, resolution):
+    """Mark the lanes in which spheres of two moving nodes are near one another; whether there are any."""
+    parts, spheres, nodes, flags = model.parts, model.spheres, model.nodes, own.flags
+    ready_node(model, own, a)
+    ready_node(model, own, b)
+    found = False
+    for i in range(parts[a, 1], parts[a, 2]):
+        radius = spheres[i, 3] + nodes[b, 3] + margin
+        if some(near(to_spheres(own.centres, i, own.balls, b), radius, rate, resolution, flags)):
+            for j in range(parts[b, 1], parts[b, 2]):
+                radius = spheres[i, 3] + spheres[j, 3] + margin
+                found |= mark_near(to_spheres(own.centres, i, own.centres, j), radius, rate, resolution, flags)
+    return found
+
+
+@kernel(borrow=True, splice=True)
+def come_first(order, i):
+    """Move entry *i* to the front."""
+    c = order[i]
+    for j in range(i, 0, -1):
+        order[j] = order[j - 1]
+    order[0] = c
+
+
 @kernel(borrow=True)
-def hit_lanes(model, space, rates, margin, resolution, enough):
-    """Hits of the sixteen configurations in ``space.q``: rows 0 (hard) and 1 (soft) of ``flags``.
+def hit_lanes(model, own, rates, margin, resolution, enough):
+    """Hits of the sixteen configurations in ``own.q``: rows 0 (hard) and 1 (soft) of ``flags``.
 
     Soft hits are those of spheres grown by what *rates* move in half a piece (row 2 of ``flags``), unless that is less
-    than *resolution*. Stops once *enough* lanes are hit hard.
+    than *resolution*. Stops once *enough* lanes are hit hard; what hit them is asked first next time.
     """
-    parts, spheres, nodes = model.parts, model.spheres, model.nodes
-    fixed, meets, selves = model.fixed, model.meets, model.selves
-    poses, balls, centres, ready = space.poses, space.balls, space.centres, space.ready
-    flags = space.flags
-    B = selves.shape[0]
-    move_lanes(model.links, model.joints, space.q, poses)
-    for k in range(parts.shape[0]):
-        ready[k] = 0
-        carry_point(poses, parts[k, 0], nodes[k, 0], nodes[k, 1], nodes[k, 2], balls, k)
+    meets, selves, flags, order = model.meets, model.selves, own.flags, own.order
+    B, C = selves.shape[0], meets.shape[0]
+    move_lanes(model.links, model.joints, own.q, own.poses)
+    own.ready[:] = 0
     for lane in range(2 * LANES):
         flags[lane] = 0.0
-    for c in range(meets.shape[0]):
-        k, o = meets[c, 0], meets[c, 1]
-        rate = rates[B + k]
-        if fixed[o, 16] >= HALF_SPACE:
-            if near_grid(model, o, balls, k, nodes[k, 3] + margin, rate, resolution, flags, False):
-                ready_node(parts, spheres, poses, centres, ready, k)
-                for s in range(parts[k, 1], parts[k, 2]):
-                    near_grid(model, o, centres, s, spheres[s, 3] + margin, rate, resolution, flags, True)
-                if count_flags(flags, 0) >= enough:
-                    return
-        elif near_fixed(fixed, o, balls, k, nodes[k, 3] + margin, rate, resolution, flags, False):
-            ready_node(parts, spheres, poses, centres, ready, k)
-            for s in range(parts[k, 1], parts[k, 2]):
-                near_fixed(fixed, o, centres, s, spheres[s, 3] + margin, rate, resolution, flags, True)
-            if count_flags(flags, 0) >= enough:
-                return
-    for p in range(B):
-        a, b = selves[p, 0], selves[p, 1]
-        rate = rates[p]
-        if near_sphere(balls, a, balls, b, nodes[a, 3] + nodes[b, 3] + margin, rate, resolution, flags, False):
-            ready_node(parts, spheres, poses, centres, ready, a)
-            ready_node(parts, spheres, poses, centres, ready, b)
-            for i in range(parts[a, 1], parts[a, 2]):
-                reach = spheres[i, 3] + nodes[b, 3] + margin
-                if near_sphere(centres, i, balls, b, reach, rate, resolution, flags, False):
-                    for j in range(parts[b, 1], parts[b, 2]):
-                        radius = spheres[i, 3] + spheres[j, 3] + margin
-                        near_sphere(centres, i, centres, j, radius, rate, resolution, flags, True)
-            if count_flags(flags, 0) >= enough:
-                return
+    for i in range(B + C):
+        c = order[i]
+        if c < C:
+            k, o = meets[c, 0], meets[c, 1]
+            rate = rates[B + k]
+            ready_ball(model, own, k)
+            close = near_node(model, own, k, o, rate, margin, resolution)
+            if close:
+                mark_fixed(model, own, k, o, rate, margin, resolution)
+        else:
+            a, b = selves[c - C, 0], selves[c - C, 1]
+            rate = rates[c - C]
+            close = near_nodes(model, own, a, b, rate, margin, resolution)
+            if close:
+                mark_selves(model, own, a, b, rate, margin, resolution)
+        if close and count_flags(flags, 0) >= enough:
+            come_first(order, i)
+            return
 
 
 @kernel

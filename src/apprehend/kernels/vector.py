@@ -132,6 +132,11 @@ def magnitude(a):
     raise NotImplementedError
 
 
+def floor(a):
+    """The largest whole numbers that are not larger."""
+    raise NotImplementedError
+
+
 def some(mask):
     """Whether *mask* is true on any lane."""
     raise NotImplementedError
@@ -236,7 +241,7 @@ def _unary(name):
     return of_one
 
 
-_sqrt, _fabs = _unary("sqrt"), _unary("fabs")
+_sqrt, _fabs, _floor = _unary("sqrt"), _unary("fabs"), _unary("floor")
 
 
 @overload(operator.invert, inline="always")
@@ -280,3 +285,8 @@ def _(a):
 @overload(magnitude, inline="always")
 def _(a):
     return lambda a: _fabs(a)
+
+
+@overload(floor, inline="always")
+def _(a):
+    return lambda a: _floor(a)
