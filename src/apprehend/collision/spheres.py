@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import heapq
-import zipfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Array
-from ..bodies.cache import cache_folder
-from ..bodies.fit import ball
-from ..files import replace_file
+from ..arrays import Array, IntArray
+from ..kernels import cover as kernels
 from ..kernels.gjk import BOX, CONE, CYLINDER, HULL
 from ..kernels.tree import TreeModel
 from .geometry import Geometry
@@ -41,25 +35,14 @@ def cover(shape: Convex, most: int = MOST, small: float = SMALL) -> Array:
     """
     if shape.kind == HULL and len(shape.points) == 1:
         return np.array([[*shape.pose[:3, 3], shape.radius]])
-    known = shape.known
-    if (most, small) not in known:
-        known[most, small] = _cover(shape, most, small)
-    balls = known[most, small]
+    known, key = shape.known, ("cover", most, small)
+    if key not in known:
+        points, edges, off = _outline(shape)
+        enough = max(small, FINE * float(shape.half.min() - shape.radius))
+        known[key] = _split(np.ascontiguousarray(points), edges, most, enough) + [0.0, 0.0, 0.0, off]
+    balls: Array = known[key]
     centres = balls[:, :3] @ shape.pose[:3, :3].T + shape.pose[:3, 3]
     return np.column_stack([centres, balls[:, 3] + shape.radius])
-
-
-def _cover(shape: Convex, most: int, small: float) -> Array:
-    points, edges = _outline(shape)
-    key = hashlib.sha256(f"2:{most}:{small}:{FINE}:{len(edges)}".encode())
-    key.update(points.tobytes())
-    kept = cache_folder("spheres") / f"{key.hexdigest()[:32]}.npz"
-    balls = _read(kept)
-    if balls is None:
-        balls = _split(points, edges, most, max(small, FINE * float(shape.half.min() - shape.radius)))
-        with replace_file(kept) as work:
-            np.savez(work, balls=balls)
-    return balls
 
 
 class Covered(NamedTuple):
@@ -89,89 +72,71 @@ def covered(tree: TreeModel, carrier: int, shapes: Sequence[Geometry], small: fl
     return Covered(balls, exactly, np.array([*middle, reach]), tree.place[carrier, 9:], radius)
 
 
-def _read(path: Path) -> Array | None:
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            balls: Array = data["balls"]
-        return balls
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
-        return None
+def _split(points: Array, edges: IntArray, most: int, enough: float) -> Array:
+    """Balls around the parts of a polytope that is cut until there are *most* or no ball is larger than *enough*."""
+    parts, balls = [(points, edges)], np.empty((most, 4))
+    kernels.ball_around(points, balls[0])
+    while len(parts) < most:
+        k = int(np.argmax(balls[: len(parts), 3]))
+        points, edges = parts[k]
+        low, high = points.min(axis=0), points.max(axis=0)
+        axis = int(np.argmax(high - low))
+        if balls[k, 3] <= enough or not low[axis] < high[axis]:
+            break
+        place, room = 0.5 * (low[axis] + high[axis]), len(points) + len(edges)
+        number, order, angles = np.empty(len(points), np.int64), np.empty(room, np.int64), np.empty(room)
+        halves = []
+        for sign in (1.0, -1.0):
+            out, sides = np.empty((room, 3)), np.empty((room + len(edges), 2), np.int64)
+            count, m = kernels.half_of(points, edges, axis, place, sign, number, order, angles, out, sides)
+            halves.append((out[:count], sides[:m]))
+        kernels.ball_around(halves[0][0], balls[k])
+        kernels.ball_around(halves[1][0], balls[len(parts)])
+        parts[k] = halves[0]
+        parts.append(halves[1])
+    return balls[: len(parts)].copy()
 
 
-def _outline(shape: Convex) -> tuple[Array, list[tuple[int, int]]]:
-    """Points whose hull contains the core, and its edges (empty: every pair of points)."""
+def _outline(shape: Convex) -> tuple[Array, IntArray, float]:
+    """Corners and edges of a polytope that contains the core, but for what sticks out of it by so much."""
     if shape.kind == HULL:
-        if not len(shape.faces):
-            return shape.points, []
-        ends, j = shape.graph
-        i = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
-        return shape.points, [(int(a), int(b)) for a, b in zip(i[i < j], j[i < j])]
+        return _corners(shape)
     if shape.kind in (CYLINDER, CONE):
-        angle = np.arange(SIDES) * (2.0 * np.pi / SIDES)
+        angle, k = np.arange(SIDES) * (2.0 * np.pi / SIDES), np.arange(SIDES)
         radius, height = shape.size[0] / np.cos(np.pi / SIDES), shape.size[1]
         ring = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(SIDES, -height)])
-        top = ring * [1.0, 1.0, -1.0] if shape.kind == CYLINDER else np.array([[0.0, 0.0, height]])
-        return np.concatenate([ring, top]), []
+        around = np.stack([k, (k + 1) % SIDES], axis=1)
+        if shape.kind == CONE:
+            points = np.concatenate([ring, [[0.0, 0.0, height]]])
+            return points, np.concatenate([around, np.stack([k, np.full(SIDES, SIDES)], axis=1)]), 0.0
+        edges = np.concatenate([around, around + SIDES, np.stack([k, k + SIDES], axis=1)])
+        return np.concatenate([ring, ring * [1.0, 1.0, -1.0]]), edges, 0.0
     half = shape.size if shape.kind == BOX else shape.half
-    return np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half, []
+    signs = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    edges = np.array([[i, i | bit] for bit in (1, 2, 4) for i in range(8) if not i & bit])
+    return signs * half, edges, 0.0
 
 
-def _split(points: Array, edges: list[tuple[int, int]], most: int, enough: float) -> Array:
-    """Cut the hull of *points* until *most* parts or no sphere is larger than *enough*."""
-    count = 0
-    heap: list[tuple[float, int, Array, Array, list[tuple[int, int]]]] = []
-
-    def push(part: Array, its_edges: list[tuple[int, int]]) -> None:
-        nonlocal count
-        centre, radius = ball(part)
-        heapq.heappush(heap, (-radius, count, centre, part, its_edges))
-        count += 1
-
-    push(points, edges)
-    while len(heap) < most and -heap[0][0] > enough:
-        _, _, _, part, its_edges = heapq.heappop(heap)
-        low, high = part.min(axis=0), part.max(axis=0)
-        axis = int(np.argmax(high - low))
-        middle = 0.5 * (low[axis] + high[axis])
-        pairs = np.array(its_edges) if its_edges else np.array(np.triu_indices(len(part), 1)).T
-        a, b = part[pairs[:, 0]], part[pairs[:, 1]]
-        across = (a[:, axis] - middle) * (b[:, axis] - middle) < 0.0
-        a, b = a[across], b[across]
-        t = (middle - a[:, axis]) / (b[:, axis] - a[:, axis])
-        section = a + t[:, None] * (b - a)
-        section[:, axis] = middle
-        for side in (part[part[:, axis] <= middle], part[part[:, axis] >= middle]):
-            push(*_corners(np.concatenate([side, section])))
-    return np.array([[*centre, -negative] for negative, _, centre, _, _ in heap])
-
-
-def _corners(points: Array) -> tuple[Array, list[tuple[int, int]]]:
-    """The corners of the hull of *points* and its edges; few or flat points stay as they are."""
+def _corners(shape: Convex) -> tuple[Array, IntArray, float]:
+    """The corners of a hull and its edges; what is flat becomes a polygon, or a segment, and what leaves its plane."""
     from scipy.spatial import ConvexHull, QhullError
 
-    points = np.unique(points, axis=0)
-    if len(points) <= 16:
-        return points, []
+    points = shape.points
+    if len(shape.faces):
+        last, j = shape.graph
+        i = np.repeat(np.arange(len(last)), np.diff(last, prepend=0))
+        return points, np.stack([i[i < j], j[i < j]], axis=1), 0.0
+    middle = points.mean(axis=0)
+    along = (points - middle) @ np.linalg.svd(points - middle, full_matrices=False)[2].T
     try:
-        hull = ConvexHull(points)
-    except QhullError:
-        return _flat_corners(points), []
-    number = np.full(len(points), -1)
-    number[hull.vertices] = np.arange(len(hull.vertices))
-    triangles = number[hull.simplices]
-    sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
-    return points[hull.vertices], [(int(i), int(j)) for i, j in np.unique(sides, axis=0)]
-
-
-def _flat_corners(points: Array) -> Array:
-    """The corners of points in one plane, or the ends of points on one line."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    along = (points - points.mean(axis=0)) @ np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2].T
-    try:
-        return np.asarray(points[ConvexHull(along[:, :2]).vertices])
-    except QhullError:
-        return np.asarray(points[[int(along[:, 0].argmin()), int(along[:, 0].argmax())]])
+        chosen = ConvexHull(along[:, :2]).vertices.astype(np.int64)
+        off = float(np.abs(along[:, 2:]).max(initial=0.0))
+    except (QhullError, ValueError):
+        chosen = np.array([along[:, 0].argmin(), along[:, 0].argmax()])
+        off = float(np.linalg.norm(along[:, 1:], axis=1).max(initial=0.0))
+    k = np.arange(len(chosen) if len(chosen) > 2 else 1)
+    off += float(np.abs(along[chosen, 2:]).max(initial=0.0)) if off else 0.0
+    return points[chosen], np.stack([k, (k + 1) % len(chosen)], axis=1), 2.0 * off
 
 
 def excess(balls: Array, shapes: tuple[Convex, ...], samples: int = 400) -> float:
