@@ -133,6 +133,17 @@ def test_saving_and_loading_keeps_everything(tmp_path: Path) -> None:
         ('household = "mug"', 'household = "mug"\nname = "table"', r"scene\.toml: 'table' names two things"),
         ('name = "brick"', 'name = "mug"', "2 bodies named 'mug'"),
         ("[robot]", "[robot", "is not TOML"),
+        ("[task]", "[[task]]", r"write \[task\] with one bracket"),
+        ("rpy = [0, 0, 0.5]", "rpy = [0, 0, 90]", r"place: rpy is .* radians, .*degrees are given as rpy_deg"),
+        ("xyz = [0.5, 0.2, 0.05]", "xyz = [500, 200, 50]", "place: xyz is .* in metres, .*is it in millimetres"),
+        ("size = [1.0, 1.4, 0.04]", "size = [1000, 1400, 40]", "size is .* in metres; are they in millimetres"),
+        ("size = [1.0, 1.4, 0.04]", "size = [1, 1, 1]\nrgba = [255, 0, 0, 1]", "rgba is .* each from 0 to 1"),
+        ("xy = [0.5, -0.2]", "xy = [5, -0.2]", "xy is .*a place on 'table', which spans 0.1 to 1.1 m in x"),
+        ('on = "table"', 'on = "floor"', "A body rests on a box; there are: table"),
+        ("clearance = 0.004", 'clearance = 0.004\nsrdf = "no.srdf"', r"scene\.toml, srdf: .*no\.srdf does not exist"),
+        ("mass = 0.3", "com = [0, 0, 1]", "number 1.*com is .*outside the convex hull"),
+        ("mass = 0.3", "inertia = [1, 1, 3, 0, 0, 0]", "number 1.*inertia has principal moments"),
+        ("mass = 0.3", "inertia = [1, 1, 3]", "inertia is .*expected a list of 6"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, words: str) -> None:

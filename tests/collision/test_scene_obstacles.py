@@ -243,6 +243,11 @@ radius = 0.1
         ('name = "a"\ngeometry = "bad.npy"', "holds no geometry"),
         ('name = "a"\ngeometry = "none.npz"', "no file of geometry"),
         ('name = "a"\nmesh = "none.obj"', "none.obj"),
+        (
+            'name = "a"\ncylinder = 0.3',
+            r"^scene [^ ]*, \[\[obstacle\]\] number 1: cylinder is 0.3; expected a list of 2",
+        ),
+        ('name = "a"\ncloud = "bda.npy"', "no file of points .*Did you mean 'bad.npy'"),
         ('name = "a"\nmesh = "m.obj"\nas = "dust"', "as is 'dust'; expected one of 'pieces'"),
         ('name = "a"\nmesh = "m.obj"\nspacing = 0.1', "spacing belongs to as"),
         ('name = "a"\nsphere = 1.0\n[[obstacle]]\nname = "a"\nsphere = 1.0', "name of another obstacle"),

@@ -131,7 +131,7 @@ def test_shapes(tmp_path: Path) -> None:
     assert (finger.kind, finger.size) == (ShapeKind.CAPSULE, pytest.approx((0.01, 0.04)))
     assert finger.rgba == (1, 0, 0, 1)
     said = "\n".join(map(str, d.repairs))
-    assert "of body 'f3': is an ellipsoid; took the box that encloses it" in said
+    assert "of body 'f3': is an ellipsoid; took a polyhedron around it, at most" in said
     assert "of body 'world': is a plane" in said
 
 

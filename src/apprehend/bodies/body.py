@@ -25,6 +25,9 @@ ASSUMED_DENSITY = 500.0
 """Density in kg/m³ if neither mass nor density is given (`Body.mass_source` then says so): between a filled bottle
 and the hollow things that make up most of a household."""
 
+DENSEST = 22_600.0
+"""Density of osmium in kg/m³: a body from a file that is denser has a wrong mass or a wrong unit."""
+
 ROUGHNESS = 3e-4
 """Rise in m below which two resting poses count as one, at most 2 % of the radius: a scan is that rough, and a round
 side has facets. At 0.3 kg it is an energy of 1 mJ."""
@@ -75,7 +78,7 @@ class Body(Models):
         *,
         torsional_friction: float = 0.005,
     ) -> Self:
-        """The body whose surface is the mesh at *path* (``.obj``, ``.stl``, ``.ply``, ``.glb``).
+        """The body whose surface is the mesh at *path* (``.obj``, ``.stl``, ``.ply``, ``.glb``, ``.off``).
 
         *mass* in kg or *density* in kg/m³; with neither, `ASSUMED_DENSITY`. *units* of the file: ``"m"``, ``"cm"``,
         ``"mm"`` or ``"in"``; None means metres, and refuses sizes that no hand could handle.
@@ -84,7 +87,7 @@ class Body(Models):
         """
         path = Path(path)
         vertices, faces = read_mesh(path, units)
-        return cls.from_mesh(
+        body = cls.from_mesh(
             vertices,
             faces,
             mass=mass,
@@ -94,6 +97,12 @@ class Body(Models):
             name=name or path.stem,
             source=path,
         )
+        if body.mass > DENSEST * body.volume:
+            raise InputError(
+                f"{path}: a mass of {body.mass:g} kg in {1e6 * body.volume:.4g} cm³ is {body.mass / body.volume:.3g} "
+                f"kg/m³, denser than any material ({DENSEST:g} kg/m³): check the mass (in kg) and the mesh's units"
+            )
+        return body
 
     @classmethod
     def from_mesh(
@@ -288,8 +297,19 @@ class Body(Models):
             changes.update(mass=kilograms, inertia=self.inertia * (kilograms / self.mass), mass_source=mass_source)
         return replace(self, **changes)  # type: ignore[arg-type]
 
+    def weighed(self, com: ArrayLike, inertia: ArrayLike | None = None) -> Body:
+        """A copy with a measured centre of mass *com* ``(3,)`` and *inertia* ``(3, 3)`` about it (None: as it is)."""
+        from dataclasses import replace
+
+        centre = as_shaped(com, f"{self.name}: com", 3)
+        if not _within_hull(self.vertices, centre):
+            raise InputError(f"{self.name}: com is {centre.tolist()}, outside the convex hull of the body")
+        tensor = self.inertia if inertia is None else as_shaped(inertia, f"{self.name}: inertia", 3, 3)
+        check_inertia(tensor, f"{self.name}: inertia")
+        return replace(self, com=centre, inertia=0.5 * (tensor + tensor.T))
+
     def save(self, path: str | Path) -> Path:
-        """Write the mesh in metres (``.obj``, ``.stl``, ``.ply`` or ``.glb``), under a temporary name first."""
+        """Write the mesh in metres (one of `FORMATS`), under a temporary name first."""
         from . import files
 
         return files.write_mesh(path, self.vertices, self.faces)

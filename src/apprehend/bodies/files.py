@@ -44,7 +44,7 @@ def read(path: str | Path, kind: str, *names: str) -> dict[str, Any]:
 
 
 def write_mesh(path: str | Path, vertices: Array, faces: IntArray) -> Path:
-    """Write a mesh in metres (``.obj``, ``.stl``, ``.ply`` or ``.glb``), under a temporary name first."""
+    """Write a mesh in metres (``.obj``, ``.stl``, ``.ply``, ``.glb`` or ``.off``), under a temporary name first."""
     import trimesh
 
     from .load import FORMATS

@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..errors import InputError, MeshError
 
-FORMATS = (".obj", ".stl", ".ply", ".glb")
+FORMATS = (".obj", ".stl", ".ply", ".glb", ".off")
 """The mesh formats that are read."""
 
 MAX_BYTES = 256 * 2**20
@@ -96,7 +96,10 @@ def _parse(data: bytes, path: Path) -> tuple[Array, IntArray]:
         raise MeshError(f"{path} is not a readable {kind.upper()} mesh ({type(error).__name__}: {error})") from error
     parts = [p for p in parts if len(p.faces)]
     if not parts:
-        raise MeshError(f"{path} holds no triangles: nothing to grasp (a point cloud or an empty scene?)")
+        raise MeshError(
+            f"{path} holds no triangles: a point cloud, or an empty scene? Points become an obstacle by "
+            "collision.Cloud.of(points), but no body"
+        )
     offsets = np.cumsum([0, *(len(p.vertices) for p in parts)])
     vertices = np.vstack([np.asarray(p.vertices, dtype=np.float64) for p in parts])
     faces = np.vstack([np.asarray(p.faces, dtype=np.int64) + o for p, o in zip(parts, offsets)])

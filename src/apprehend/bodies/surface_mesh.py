@@ -57,7 +57,7 @@ class SurfaceMesh:
         return Deviation(outward, inward, False, self.volume, volume)
 
     def save(self, path: str | Path) -> Path:
-        """Write the mesh (``.obj``, ``.stl``, ``.ply`` or ``.glb``)."""
+        """Write the mesh (``.obj``, ``.stl``, ``.ply``, ``.glb`` or ``.off``)."""
         return files.write_mesh(path, self.vertices, self.faces)
 
     @classmethod
@@ -141,7 +141,11 @@ def _welded(
 ) -> SurfaceMesh:
     """Triangles whose corners lie on grid *edges* ``(F, 3, 2)``, with one vertex on each edge."""
     if not len(edges):
-        raise InputError(f"the field never takes the value {level:g} m, so there is no surface at it")
+        least, most = (1e3 * float(v) for v in (values.min(), values.max()))
+        raise InputError(
+            f"the field takes values from {least:.3g} to {most:.3g} mm, so there is no surface at {1e3 * level:g} mm; "
+            "where walls are thinner than the grid is fine, give a smaller resolution or a level above the error"
+        )
     ends = np.sort(edges.reshape(-1, 2), axis=1)
     keys, inverse = np.unique(ends[:, 0] * values.size + ends[:, 1], return_inverse=True)
     low, high = keys // values.size, keys % values.size

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from ..collision import Scene
     from ..process import Episode
 
-MESHES = (".obj", ".stl", ".ply", ".glb")
+MESHES = (".obj", ".stl", ".ply", ".glb", ".off")
 
 
 def command(
     target: Annotated[
         str | None,
-        typer.Argument(help="scene (.toml), mesh (.obj, .stl, .ply, .glb) or household object", show_default="mug"),
+        typer.Argument(help="scene (.toml), mesh (.obj, .stl, .ply, .glb, .off) or household object", show_default="mug"),
     ] = None,
     robot: Annotated[str | None, typer.Option(help="catalogue name or description file", show_default="ur5e")] = None,
     hand: Annotated[

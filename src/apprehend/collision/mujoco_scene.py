@@ -13,7 +13,7 @@ from ..robots import FixedThing, FreeBody, read_world, shape_surface
 from ..robots.description import ShapeKind
 from .obstacles import HalfSpace, Union
 from .scene import Box, Obstacle, Placed, RobotSource, Scene
-from .shapes import shape_convexes
+from .shapes import Convex, shape_convexes
 
 if TYPE_CHECKING:
     from ..bodies import Body
@@ -24,8 +24,8 @@ def from_mujoco(source: object, *, robot: str | None = None) -> Scene:
 
     - Bodies with a free joint become movable bodies with the model's masses, where the keyframe ``home`` (or the only
       one, or the reference) has them; geoms of one body are united.
-    - Geoms that stand still become boxes (boxes), half-spaces (planes), surfaces (height fields) and convex obstacles
-      (everything else; meshes as a few hulls that contain them).
+    - Geoms that stand still become boxes (boxes), half-spaces (planes), surfaces (height fields), ellipsoids, and
+      convex obstacles (everything else; meshes as a few hulls that contain them).
     - What moves by other joints is the robot; *robot* names one of its bodies where there are several. Its home is
       the keyframe. See `read_world`.
 
@@ -95,6 +95,8 @@ def _obstacle(thing: FixedThing, name: str) -> Obstacle:
     look: dict[str, Any] = {"rgba": thing.rgba, "friction": thing.friction}
     if thing.surface is not None:
         return Obstacle.of(name, Union.surface(*thing.surface), thing.pose, **look)
+    if thing.radii is not None:
+        return Obstacle.of(name, Convex.ellipsoid(thing.radii), thing.pose, **look)
     if thing.shape is None:
         return Obstacle.of(name, HalfSpace(thing.pose), **look)
     return Obstacle.of(name, shape_convexes(thing.shape), **look)

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from ..errors import DescriptionError
+from ..errors import DescriptionError, suggestion
 from ..files import replace_file
 from ..kernels.gjk import BOX, CONE, CYLINDER, ELLIPSOID
 from .geometry import Geometry
@@ -54,7 +54,7 @@ def read(table: Table, folder: Path) -> Obstacle:
     T = table.pose("pose") if "pose" in table else np.eye(4)
     options: dict[str, Any] = {}
     if "rgba" in table:
-        options["rgba"] = tuple(float(c) for c in table.numbers("rgba", 4))
+        options["rgba"] = table.colour("rgba")
     if "friction" in table:
         options["friction"] = table.number("friction", 0.0, at_least=0.0)
     origin = {key: table.values[key] for key in (kind, *OPTIONS) if key in table} | {"pose": T}
@@ -104,6 +104,9 @@ def _mesh(table: Table, path: Path) -> object:
 
 def read_points(path: Path) -> Array:
     """Points ``(N, 3)`` of a file: .npy, .npz (its array ``points``, or the only one), .ply, .xyz, .txt or .csv."""
+    if not path.is_file():
+        near = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        raise DescriptionError(f"there is no file of points {path}.{suggestion(path.name, near)}")
     try:
         if path.suffix == ".npy":
             return np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
@@ -119,8 +122,6 @@ def read_points(path: Path) -> Array:
         if path.suffix in (".xyz", ".txt", ".csv"):
             rows = np.loadtxt(path, delimiter="," if path.suffix == ".csv" else None, ndmin=2)
             return np.asarray(rows[:, :3], dtype=np.float64)
-    except FileNotFoundError:
-        raise DescriptionError(f"there is no file of points {path}") from None
     except (OSError, ValueError, IndexError, AttributeError, zipfile.BadZipFile) as error:
         raise DescriptionError(f"{path} holds no readable points: {error}") from error
     raise DescriptionError(f"{path} is of an unknown kind; points are read from .npy, .npz, .ply, .xyz, .txt and .csv")

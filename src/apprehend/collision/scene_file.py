@@ -23,6 +23,8 @@
     mesh = "mug.obj"                        # or household = "mug", box = [x, y, z],
                                             # cylinder = [radius, length], sphere = radius
     mass = 0.3                              # kg; or density in kg/m³
+    # com = [0, 0, 0.04]                    # where they were measured: in the mesh's coordinates, in m,
+    # inertia = [ixx, iyy, izz, ixy, ixz, iyz]    # and about it, in kg m²
     pose = {xyz = [0.5, -0.2, 0.05], rpy_deg = [0, 0, 30]}
     # or: rest = {on = "table", xy = [0.5, -0.2], yaw_deg = 30}      choose = 0: the most probable stable pose
 
@@ -56,7 +58,7 @@ from ..files import replace_file
 from . import obstacle_tables
 from .allowed import srdf_pairs
 from .scene import Box, Placed, RobotSource, Scene
-from .table import Table, pose_text, quoted
+from .table import FAR, Table, pose_text, quoted
 from .tabletop import resting
 
 if TYPE_CHECKING:
@@ -70,7 +72,9 @@ TOP = ("robot", "box", "body", "obstacle", "goal", "task", "clearance", "gravity
 ROBOT = ("arm", "hand", "at", "mount", "base", "prefix", "within")
 BOX = ("name", "size", "pose", "rgba", "friction")
 SHAPES = ("mesh", "household", "box", "cylinder", "sphere")
-BODY = ("name", *SHAPES, "units", "mass", "density", "friction", "pose", "rest", "movable")
+BODY = ("name", *SHAPES, "units", "mass", "density", "com", "inertia", "friction", "torsional_friction",
+        "pose", "rest", "movable")  # fmt: skip
+NUMBERS = ("mass", "density", "friction", "torsional_friction")
 REST = ("on", "xy", "yaw_deg", "choose")
 TASK = ("pick", "place", "upright")
 GOAL = ("body", "pose")
@@ -141,7 +145,8 @@ def _allowed(top: Table, folder: Path, robot: Robot) -> tuple[tuple[str, str], .
         raise top.error("allowed", 'a list of pairs of names, such as [["table", "base_link"]]')
     found = [(str(a), str(b)) for a, b in pairs]
     if "srdf" in top:
-        found += [(a, b) for a, b in sorted(sorted(p) for p in srdf_pairs(folder / top.need_text("srdf"), robot))]
+        pairs = _at(f"{top.where}, srdf", srdf_pairs, folder / top.need_text("srdf"), robot)
+        found += [(a, b) for a, b in sorted(sorted(p) for p in pairs)]
     return tuple(found)
 
 
@@ -150,6 +155,8 @@ def _at(where: str, call: Any, *args: Any, **options: Any) -> Any:
     try:
         return call(*args, **options)
     except ApprehendError as error:
+        if str(error).startswith(where):
+            raise
         raise type(error)(f"{where}: {error}") from error
 
 
@@ -191,10 +198,12 @@ def _text_or_empty(table: Table, key: str) -> str | None:
 def _box(table: Table) -> Box:
     options: dict[str, Any] = {}
     if "rgba" in table:
-        options["rgba"] = tuple(float(c) for c in table.numbers("rgba", 4))
+        options["rgba"] = table.colour("rgba")
     if "friction" in table:
         options["friction"] = table.number("friction", 0.0, at_least=0.0)
     pose = table.pose("pose")
+    if table.numbers("size", 3).min() > 0.1 * FAR:
+        raise table.error("size", "full extents in metres; are they in millimetres?")
     box: Box = _at(table.where, Box, table.need_text("name"), table.numbers("size", 3), pose, **options)
     return box
 
@@ -211,7 +220,7 @@ def _body(table: Table, folder: Path, boxes: tuple[Box, ...]) -> Placed:
         raise DescriptionError(f"{table.where} has both mass and density; give one")
     if "units" in table and kind != "mesh":
         raise DescriptionError(f"{table.where}: units belong to a mesh; a {kind} is given in metres")
-    options: dict[str, Any] = {k: table.number(k, 0.0) for k in ("mass", "density", "friction") if k in table}
+    options: dict[str, Any] = {k: table.number(k, 0.0) for k in NUMBERS if k in table}
     options |= {k: table.need_text(k) for k in ("name", "units") if k in table}
     origin: dict[str, object] = {}
     if kind == "mesh":
@@ -238,10 +247,24 @@ def _body(table: Table, folder: Path, boxes: tuple[Box, ...]) -> Placed:
             *([] if kind == "box" else numbers[1:]),
             **options,
         )
+    body = _measured(table, body)
     if ("pose" in table) == ("rest" in table):
         raise DescriptionError(f"{table.where} needs either a pose or a rest on a box")
     pose = table.pose("pose") if "pose" in table else _rest(table, body, boxes)
     return Placed(body, pose, table.flag("movable", True), origin)
+
+
+def _measured(table: Table, body: Body) -> Body:
+    """The body with the centre of mass and the inertia that the table states, if it does."""
+    if "com" not in table and "inertia" not in table:
+        return body
+    com = table.numbers("com", 3) if "com" in table else body.com
+    inertia = None
+    if "inertia" in table:
+        xx, yy, zz, xy, xz, yz = table.numbers("inertia", 6)
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    made: Body = _at(table.where, body.weighed, com, inertia)
+    return made
 
 
 def _rest(table: Table, body: Body, boxes: tuple[Box, ...]) -> Array:
@@ -251,15 +274,28 @@ def _rest(table: Table, body: Body, boxes: tuple[Box, ...]) -> Array:
         if box.name == on:
             break
     else:
-        hint = suggestion(on, [b.name for b in boxes])
+        hint = suggestion(on, [b.name for b in boxes]) or (
+            f" A body rests on a box; there are: {', '.join(b.name for b in boxes) or 'none'}."
+        )
         raise DescriptionError(f"{rest.where}: there is no box named {on!r} in this scene.{hint}")
     x, y = rest.numbers("xy", 2)
+    beyond = np.abs((np.array([x, y, box.top]) - box.pose[:3, 3]) @ box.pose[:3, :3]) - 0.5 * box.size
+    if beyond.max() > 1e-6:
+        low, high = _footprint(box)
+        raise rest.error("xy", f"a place on {on!r}, which spans {low[0]:g} to {high[0]:g} m in x and "
+                               f"{low[1]:g} to {high[1]:g} m in y")  # fmt: skip
     choose = rest.values.get("choose")
     if choose is not None and (isinstance(choose, bool) or not isinstance(choose, int)):
         raise rest.error("choose", "a whole number (0: the most probable stable pose)")
     yaw = rest.number("yaw_deg", 0.0) * DEGREE
     pose: Array = _at(rest.where, resting, body, float(x), float(y), box.top, yaw=yaw, choose=choose)
     return pose
+
+
+def _footprint(box: Box) -> tuple[Array, Array]:
+    """Lower and upper end of a box in x and y of the world."""
+    half = 0.5 * np.abs(box.pose[:2, :3]) @ box.size
+    return box.pose[:2, 3] - half, box.pose[:2, 3] + half
 
 
 def _task(
@@ -278,6 +314,8 @@ def _task(
         goals[known(table, "body")] = table.pose("pose")
     if "task" not in data:
         return goals, None, False
+    if isinstance(data["task"], list):
+        raise DescriptionError(f"{where}: write [task] with one bracket on each side, for there is one task")
     task = Table(data["task"], f"{where}, [task]", TASK)
     pick = known(task, "pick")
     if "place" in task:
@@ -285,9 +323,29 @@ def _task(
     return goals, pick, task.flag("upright", False)
 
 
+def _near(name: str, folder: Path) -> str:
+    """A file in *folder* as seen from there; another name as it is."""
+    file, root = Path(name).resolve(), folder.resolve()
+    if not Path(name).is_file():
+        return name
+    return file.relative_to(root).as_posix() if file.is_relative_to(root) else str(file)
+
+
 def _allowed_lines(allowed: tuple[tuple[str, str], ...]) -> list[str]:
     pairs = ", ".join(f"[{quoted(a)}, {quoted(b)}]" for a, b in allowed)
     return [f"allowed = [{pairs}]"] if pairs else []
+
+
+def _measured_lines(body: Body) -> list[str]:
+    """Centre of mass and inertia, where they are not those of the solid of even density."""
+    even = type(body).from_mesh(body.vertices, body.faces, mass=body.mass, name=body.name)
+    lines = []
+    if not np.allclose(even.com, body.com, rtol=0.0, atol=1e-9 * body.radius):
+        lines.append(f"com = {body.com.tolist()}")
+    if lines or not np.allclose(even.inertia, body.inertia, rtol=0.0, atol=1e-9 * float(np.trace(body.inertia))):
+        moments = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        lines.append(f"inertia = {moments.tolist()}")
+    return lines
 
 
 # --- writing -------------------------------------------------------------------------------------------------------
@@ -300,18 +358,14 @@ def save(scene: Scene, path: Path) -> Path:
     lines = [
         f"clearance = {scene.clearance!r}",
         f"gravity = {scene.gravity!r}",
-        *(
-            [f"allowed = [{', '.join(f'[{quoted(a)}, {quoted(b)}]' for a, b in scene.allowed)}]"]
-            if scene.allowed
-            else []
-        ),
+        *_allowed_lines(scene.allowed),
         "",
         "[robot]",
-        f"arm = {quoted(source.arm)}",
+        f"arm = {quoted(_near(source.arm, path.parent))}",
     ]
     lines += [f"within = {quoted(source.within)}"] * (source.within is not None)
     if source.hand is not None:
-        lines.append(f"hand = {quoted(source.hand)}")
+        lines.append(f"hand = {quoted(_near(source.hand, path.parent))}")
         lines += [f"at = {quoted(source.at)}"] * (source.at is not None)
         lines += [f"prefix = {quoted(source.prefix)}"] * (source.prefix is not None)
         lines += [f"mount = {pose_text(source.mount)}"] if source.mount is not None else []
@@ -333,16 +387,13 @@ def save(scene: Scene, path: Path) -> Path:
             origin = {"mesh": str(mesh)}
         lines += ["", "[[body]]", f"name = {quoted(name)}"]
         for key, value in origin.items():
-            if key == "mesh" and Path(str(value)).is_relative_to(path.parent.resolve()):
-                value = Path(str(value)).relative_to(path.parent.resolve()).as_posix()
-            elif key == "mesh" and Path(str(value)).parent == path.parent:
-                value = Path(str(value)).name
+            if key == "mesh":
+                value = _near(str(value), path.parent)
             lines.append(f"{key} = {quoted(value) if isinstance(value, str) else value}")
-        lines += [
-            f"mass = {float(body.mass)!r}",
-            f"friction = {float(body.friction)!r}",
-            f"pose = {pose_text(placed.pose)}",
-        ]
+        lines += [f"mass = {float(body.mass)!r}", *_measured_lines(body), f"friction = {float(body.friction)!r}"]
+        if body.torsional_friction != type(body).torsional_friction:
+            lines.append(f"torsional_friction = {float(body.torsional_friction)!r}")
+        lines.append(f"pose = {pose_text(placed.pose)}")
         lines += ["movable = false"] * (not placed.movable)
     for obstacle in scene.obstacles.values():
         lines += obstacle_tables.lines(obstacle, path)

@@ -14,6 +14,12 @@ from .rotations import matrix_quaternion, quaternion_matrix, rpy_matrix
 
 POSE = ("xyz", "rpy", "rpy_deg", "wxyz")
 
+FAR = 100.0
+"""What is farther away than this, in m, stands in no scene: the unit is wrong."""
+
+TURN = 6.3
+"""Angles that are larger than this, in rad, are degrees."""
+
 
 class Table:
     """One table of the file with its place, so that every message can say where it stood."""
@@ -66,6 +72,13 @@ class Table:
             raise self.error(key, "true or false")
         return value
 
+    def colour(self, key: str) -> tuple[float, ...]:
+        """A colour with its opacity, four numbers from 0 to 1."""
+        values = self.numbers(key, 4)
+        if values.min() < 0.0 or values.max() > 1.0:
+            raise self.error(key, "red, green, blue and opacity, each from 0 to 1")
+        return tuple(float(c) for c in values)
+
     def numbers(self, key: str, count: int) -> Array:
         """A list of *count* finite numbers that must be there."""
         value = self.values.get(key)
@@ -92,8 +105,14 @@ class Table:
                 raise DescriptionError(f"{table.where}: wxyz has length {norm:.4g}; a rotation is a unit quaternion")
             T[:3, :3] = quaternion_matrix(quaternion / norm)
         elif turns:
-            T[:3, :3] = rpy_matrix(table.numbers(turns[0], 3) * (DEGREE if turns[0] == "rpy_deg" else 1.0))
-        T[:3, 3] = table.numbers("xyz", 3) if "xyz" in table else 0.0
+            angles = table.numbers(turns[0], 3)
+            if turns[0] == "rpy" and np.abs(angles).max() > TURN:
+                raise table.error("rpy", "angles in radians, at most one turn; degrees are given as rpy_deg")
+            T[:3, :3] = rpy_matrix(angles * (DEGREE if turns[0] == "rpy_deg" else 1.0))
+        if "xyz" in table:
+            T[:3, 3] = table.numbers("xyz", 3)
+            if np.abs(T[:3, 3]).max() > FAR:
+                raise table.error("xyz", f"a place in metres, at most {FAR:g} m from the origin; is it in millimetres?")
         return T
 
 

@@ -81,6 +81,9 @@ def _compile(path: Path, packages: Packages, meshes: str) -> tuple[Any, list[Rep
     except ValueError as error:
         raise DescriptionError(f"{path}: {_one_line(error)}") from None
     repairs += [Repair(path.name, _one_line(w.message), "read as MuJoCo reads it") for w in said]
+    for mesh in spec.meshes:
+        if np.any(mesh.refpos) or not np.array_equal(mesh.refquat, [1.0, 0.0, 0.0, 0.0]):
+            model.mesh_pathadr[mesh.id] = -1  # moved against its file: taken as compiled
     return model, repairs, document.root.get("model") or path.stem
 
 

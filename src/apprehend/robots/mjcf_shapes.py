@@ -57,8 +57,9 @@ def _shape(m: Any, g: int, path: Path, report: Report) -> Shape | None:
         pose = pose @ np.linalg.inv(from_quaternion(m.mesh_pos[k], m.mesh_quat[k]))
         return Shape(ShapeKind.MESH, scale, pose, file, color, name)
     if kind == kinds.mjGEOM_ELLIPSOID:
-        report(what, "is an ellipsoid", "took the box that encloses it")
-        return Shape(ShapeKind.BOX, (2 * size[0], 2 * size[1], 2 * size[2]), pose, None, color, name)
+        growth, ball = _ball()
+        report(what, "is an ellipsoid", f"took a polyhedron around it, at most {growth - 1.0:.1%} larger")
+        return Shape(ShapeKind.MESH, (size[0], size[1], size[2]), pose, ball, color, name)
     report(what, "is a plane, a height field or another unbounded shape", "left it out")
     return None
 
@@ -78,7 +79,22 @@ def _kept_mesh(m: Any, mesh: int) -> Path:
     start, faces = int(m.mesh_faceadr[mesh]), int(m.mesh_facenum[mesh])
     rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in m.mesh_vert[first : first + count].astype(float).tolist()]
     rows += [f"f {i + 1} {j + 1} {k + 1}" for i, j, k in m.mesh_face[start : start + faces].tolist()]
-    text = "\n".join([*rows, ""])
+    return _kept("\n".join([*rows, ""]))
+
+
+def _ball() -> tuple[float, Path]:
+    """How far the corners of a polyhedron around the unit ball are from its centre, and a file with the polyhedron."""
+    from trimesh.creation import icosphere
+
+    mesh = icosphere(subdivisions=2)
+    growth = 1.0 / float(np.einsum("fi,fi->f", mesh.face_normals, mesh.triangles[:, 0]).min())
+    rows = [f"v {growth * x:.12f} {growth * y:.12f} {growth * z:.12f}" for x, y, z in mesh.vertices.tolist()]
+    rows += [f"f {i + 1} {j + 1} {k + 1}" for i, j, k in mesh.faces.tolist()]
+    return growth, _kept("\n".join([*rows, ""]))
+
+
+def _kept(text: str) -> Path:
+    """A file of the cache with this text."""
     key = hashlib.sha256(text.encode()).hexdigest()[:32]
     path = cache_root() / "mujoco" / f"{key}.obj"
     if not path.is_file():

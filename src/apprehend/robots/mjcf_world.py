@@ -41,6 +41,7 @@ class FixedThing:
     surface: tuple[Array, IntArray] | None
     rgba: tuple[float, float, float, float]
     friction: float
+    radii: Array | None = None  # of an ellipsoid, which *shape* encloses
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +214,9 @@ class _World:
                 shape = self._shape(b, g, T)
                 if shape is None:
                     continue
-            found.append(FixedThing(name, self.body[b], pose, shape, surface, colour, float(m.geom_friction[g, 0])))
+            radii = m.geom_size[g].copy() if m.geom_type[g] == kinds.mjGEOM_ELLIPSOID else None
+            friction = float(m.geom_friction[g, 0])
+            found.append(FixedThing(name, self.body[b], pose, shape, surface, colour, friction, radii))
         return found
 
     def _shape(self, b: int, g: int, T: Array) -> Shape | None:

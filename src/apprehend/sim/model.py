@@ -77,9 +77,11 @@ def specification(scene: Scene, physics: Physics | None = None) -> Any:
     """*scene* as a ``mujoco.MjSpec``: robot, bodies with free joints, boxes, obstacles, and the keyframe ``home``.
 
     Names carry what they are: ``link:``, ``joint:``, ``body:``, ``box:``, ``obstacle:``. `Scene.from_mujoco` is the way
-    back.
+    back. What the descriptions left open, or the engine cannot take as it stands, is said in the text ``assumptions``.
     """
-    spec, _, _ = _specified(scene, physics or Physics())
+    spec, _, assumptions = _specified(scene, physics or Physics())
+    if assumptions:
+        spec.add_text(name="assumptions", data=". ".join(assumptions))
     model = _compile(spec, scene.robot.name)
     data = mujoco.MjData(model)
     expand, offset, names = _expansion(scene.robot.description, scene.robot.joint_names)

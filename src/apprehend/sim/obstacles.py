@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import mujoco
+import numpy as np
 
+from ..arrays import Array
 from ..collision import Convex, HalfSpace, Union
 from ..kernels.gjk import BOX, CYLINDER, ELLIPSOID
 from .shapes import FIXED_GROUP, STATIC, add_mesh, is_flat, place
@@ -18,12 +20,16 @@ if TYPE_CHECKING:
 MANY = 500
 """Largest union that the engine gets piece by piece."""
 
+PLATE = 2e-3
+"""Thickness in m of a triangle in the engine."""
+
 
 def add_obstacle(spec: Any, obstacle: Obstacle, physics: Physics) -> str | None:
     """Add a fixed obstacle to the world; returns a sentence where the engine cannot have all of it.
 
-    Half-spaces become planes and convex shapes primitives or hulls. Clouds and distance fields have no contact in the
-    engine, nor have triangles; what is planned keeps clear of them, what is simulated does not feel them.
+    Half-spaces become planes and convex shapes primitives or hulls; triangles, such as those of a height field, become
+    plates that reach `PLATE` below their faces. Clouds and distance fields have no contact in the engine: what is
+    planned keeps clear of them, what is simulated does not feel them.
     """
     holder = spec.worldbody.add_body(name=f"obstacle:{obstacle.name}")
     options: dict[str, Any] = {
@@ -67,12 +73,20 @@ def _add(spec: Any, holder: Any, shape: Geometry, name: str, options: dict[str, 
         geom = holder.add_geom(type=kinds.mjGEOM_ELLIPSOID, size=size, **options)
     elif len(shape.points) in (1, 2):
         return _round(holder, shape, options)
-    elif not len(shape.points) or shape.radius > 0.0 or is_flat(shape.points):
-        return False
     else:
-        geom = holder.add_geom(type=kinds.mjGEOM_MESH, meshname=add_mesh(spec, name, shape.points), **options)
+        points = plate(shape.points) if len(shape.points) == 3 else shape.points
+        if not len(points) or shape.radius > 0.0 or is_flat(points):
+            return False
+        geom = holder.add_geom(type=kinds.mjGEOM_MESH, meshname=add_mesh(spec, name, points), **options)
     place(geom, shape.pose)
     return True
+
+
+def plate(triangle: Array) -> Array:
+    """Corners ``(6, 3)`` of the prism of thickness `PLATE` below a triangle ``(3, 3)``."""
+    normal = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
+    below: Array = triangle - PLATE * normal / max(float(np.linalg.norm(normal)), 1e-300)
+    return np.concatenate([triangle, below])
 
 
 def _round(holder: Any, shape: Convex, options: dict[str, Any]) -> bool:
