@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .collide_plan import CONNECTED, FULL, MORE, PATIENCE, length, nearest_node, point_at
+from .collide_plan import CONNECTED, FULL, MORE, PATIENCE, SHRINK, length, nearest_node, point_at
 from .constrain import constrain_space, project_one
 from .constrain_hold import holds
 from .lane_edges import edge_blocked, edge_space
@@ -36,7 +36,7 @@ class Task(NamedTuple):
     keep: tuple
     lower: np.ndarray  # (n,)
     upper: np.ndarray  # (n,)
-    scale: np.ndarray  # (4,): longest and shortest step, clearance, resolution
+    scale: np.ndarray  # (6,): longest and shortest step, clearance, resolution, widest and least domain
 
 
 @kernel(borrow=True)
@@ -107,10 +107,11 @@ def reach(task, nodes, parent, count, row, goal, edge, space, tally):
 
 
 @kernel(inline=True)
-def grow(task, nodes, parent, count, samples, ends, tally, target, edge, space):
+def grow(task, nodes, parent, domain, count, samples, ends, tally, target, edge, space):
     """Grow both trees with the configurations of ``samples (S, n)``, the smaller tree first.
 
-    Returns ``(status, samples used)``; when connected, ``ends (2,)`` are the last nodes of the trees: the same
+    ``domain (2, C)`` is how far from a node samples are of use to it: infinite until the first step from the node is
+    blocked, then less with every such step, as in `collide_plan.grow`. Returns ``(status, samples used)``; when connected, ``ends (2,)`` are the last nodes of the trees: the same
     configuration.
     """
     status, used = MORE, 0
@@ -120,8 +121,14 @@ def grow(task, nodes, parent, count, samples, ends, tally, target, edge, space):
         used += 1
         one = 0 if count[0] <= count[1] else 1
         for k in (one, 1 - one):
-            row, _ = nearest_node(nodes[k], count[k], target)
+            row, far = nearest_node(nodes[k], count[k], target)
+            if k == one and far > domain[k, row]:
+                break
+            before = count[k]
             count[k], ends[k], outcome = reach(task, nodes[k], parent[k], count[k], row, target, edge, space, tally)
+            if k == one and count[k] == before and outcome == STOPPED:
+                domain[k, row] = max(task.scale[5], min(task.scale[4], SHRINK * domain[k, row]))
+                break
             for j in range(target.shape[0]):
                 target[j] = nodes[k, ends[k], j]
             if outcome == NO_ROOM:
@@ -188,7 +195,7 @@ def shorten(task, path, count, pairs, way, rest, parent, goal, edge, space, tall
 
 
 @kernel
-def search(task, nodes, parent, count, samples, path, pairs, ends, tally):
+def search(task, nodes, parent, domain, count, samples, path, pairs, ends, tally):
     """`grow` the trees if there are *samples*, else shorten ``path`` of ``count[0]`` vertices with *pairs*.
 
     One kernel for both: what checks a motion takes long to compile.
@@ -197,7 +204,7 @@ def search(task, nodes, parent, count, samples, path, pairs, ends, tally):
     edge, space = edge_space(task.exact, task.lanes, n), constrain_space(task.keep, n)
     target = np.empty(n)
     if samples.shape[0] > 0:
-        return grow(task, nodes, parent, count, samples, ends, tally, target, edge, space)
+        return grow(task, nodes, parent, domain, count, samples, ends, tally, target, edge, space)
     way, rest, parents, vertices = np.empty_like(path), np.empty_like(path), np.zeros(path.shape[0], np.int64), count[0]
     for last in range(2):
         vertices = thin(task, path, vertices, edge, space, tally)

@@ -14,6 +14,9 @@ from .keeping import Constraints
 STRIDE, LEAST = 0.5, 0.03
 """Longest and shortest step before it is moved onto the constraint, in rad (and m)."""
 
+WIDEST, NARROWEST = 0.5, 0.25
+"""Bounds of a node's domain (see `kernels.constrain_plan.grow`) relative to the diagonal of the joint space."""
+
 FIRST_ROOM = 512
 """Nodes that a tree has room for at first."""
 
@@ -30,11 +33,13 @@ class ConstrainedSearch:
         self, model: CollisionModel, keep: Constraints, start: Array, goals: Array, low: Array, high: Array, most: int
     ):
         self.low, self.high, self.most = low, high, max(most, 2 * len(goals) + 2)
-        scale = np.array([STRIDE, LEAST, model.clearance, model.resolution])
+        across = float(np.linalg.norm(high - low))
+        scale = np.array([STRIDE, LEAST, model.clearance, model.resolution, WIDEST * across, NARROWEST * across])
         self.task = constrain_plan.Task(model.compiled, model.lanes, keep.compiled, low, high, scale)
         room = min(self.most, max(FIRST_ROOM, 4 * len(goals)))
         self.nodes = np.empty((2, room, len(start)))
         self.parent = np.full((2, room), -1, np.int64)
+        self.domain = np.full((2, room), np.inf)
         self.count = np.zeros(2, np.int64)
         self.tally = np.zeros(3, np.int64)
         self.samples = 0
@@ -84,7 +89,7 @@ class ConstrainedSearch:
     def _run(self, count: IntArray, samples: Array, path: Array, pairs: Array, ends: IntArray) -> tuple[int, int]:
         began, known = time.perf_counter(), len(constrain_plan.search.overloads)
         status, number = constrain_plan.search(
-            self.task, self.nodes, self.parent, count, samples, path, pairs, ends, self.tally
+            self.task, self.nodes, self.parent, self.domain, count, samples, path, pairs, ends, self.tally
         )
         if len(constrain_plan.search.overloads) > known:
             self.compiling += time.perf_counter() - began
@@ -105,5 +110,6 @@ class ConstrainedSearch:
         old = self.nodes.shape[1]
         room = min(4 * old, self.most)
         nodes, parent = np.empty((2, room, self.nodes.shape[2])), np.full((2, room), -1, np.int64)
-        nodes[:, :old], parent[:, :old] = self.nodes, self.parent
-        self.nodes, self.parent = nodes, parent
+        domain = np.full((2, room), np.inf)
+        nodes[:, :old], parent[:, :old], domain[:, :old] = self.nodes, self.parent, self.domain
+        self.nodes, self.parent, self.domain = nodes, parent, domain
