@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from apprehend.collision import CollisionModel, Convex
-from apprehend.collision.nodes import can_meet, matrix, pair
+from apprehend.collision.nodes import matrix
 from apprehend.kinematics import Robot
 from apprehend.parallel import set_threads
 from apprehend.planning import plan, shortcut
@@ -78,31 +78,25 @@ def free_by_coal(model: CollisionModel, path: np.ndarray, step: float = 0.002) -
     import coal
 
     robot, tree = model.robot, model.robot.model
-    bodies = []
+    bodies: list[list[Any]] = []
     for node in model.nodes:
         frame = robot.frame_index(node.name) if node.carrier >= 0 else -1
         place = matrix(tree.frame_place[frame]) if frame >= 0 else np.eye(4)
-        for shape in node.shapes:
-            made, at = coal_of(shape)
-            bodies.append((node, frame, made, np.linalg.inv(place) @ at))
-    checked = [
-        (a, b)
-        for i, a in enumerate(bodies)
-        for b in bodies[:i]
-        if a[0] is not b[0] and can_meet(tree, a[0], b[0]) and pair(a[0].name, b[0].name) not in model.reasons
-    ]
+        made = [coal_of(shape) for shape in node.shapes]
+        bodies.append([(frame, shape, np.linalg.inv(place) @ at) for shape, at in made])
+    checked = [(a, b) for i, j in model.compiled.blocks[:, :2] for a in bodies[i] for b in bodies[j]]
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
     for q0, q1, length in zip(path[:-1], path[1:], lengths, strict=True):
         q = q0 + np.linspace(0.0, 1.0, int(np.ceil(length / step)) + 1)[:, None] * (q1 - q0)
         for T in robot.fk(q):
             placed = {}
-            for body in bodies:
-                X = (T[body[1]] if body[1] >= 0 else np.eye(4)) @ body[3]
-                placed[id(body)] = coal.Transform3s(X[:3, :3], X[:3, 3])
-            for a, b in checked:
+            for frame, shape, at in (body for node in bodies for body in node):
+                X = (T[frame] if frame >= 0 else np.eye(4)) @ at
+                placed[id(shape)] = coal.Transform3s(X[:3, :3], X[:3, 3])
+            for (_, a, _), (_, b, _) in checked:
                 result.clear()
-                if coal.collide(a[2], placed[id(a)], b[2], placed[id(b)], request, result):
+                if coal.collide(a, placed[id(a)], b, placed[id(b)], request, result):
                     return False
     return True
 

@@ -143,7 +143,7 @@ def _touching(robot: Robot, links: Sequence[Node], pairs: Sequence[Pair], q: Arr
     others = {pair(a.name, b.name) for i, a in enumerate(links) for b in links[:i]} - set(pairs)
     model = Alone(robot.model, tuple(links), others).with_others((), ())
     hits = np.zeros(len(model.blocks), np.int64)
-    collide.check(model, q, clearance, 0, len(q), np.zeros(0, np.int64), hits)
+    collide.count_hits(model, q, clearance, 0, len(q), hits)
     found = {pair(links[a].name, links[b].name): n for (a, b), n in zip(model.blocks[:, :2], hits, strict=True)}
     return np.array([found[p] for p in pairs], dtype=np.float64)
 

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 RESOLUTION = 2e-5
 """Default of `CollisionModel.resolution`, in m."""
 
-NONE = np.zeros(0, np.int64)
-
 
 class Arrangement:
     """A robot and its surroundings as convex shapes that are rigid with joints, and the pairs that may touch.

@@ -15,16 +15,13 @@ from ..arrays import Array, BoolArray, IntArray, as_shaped
 from ..errors import InputError
 from ..kernels import collide, collide_edges, collide_sweep, sphere
 from ..parallel import over_ranges
-from .arrangement import NONE, Arrangement
+from .arrangement import Arrangement
 
 GRAIN = 16
 """Smallest share of a batch that is worth a thread."""
 
 LANE_GRAIN = 512
 """The same, for spheres on lanes."""
-
-WHOLE_TURNS = 1e4
-"""Joint values above this, in rad, are left to the exact check: lanes reduce angles to 1e5 only."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +102,7 @@ class CollisionModel(Arrangement):
         out = np.full(len(rows), -1, np.int64)
         model, margin = self.compiled, self.clearance
         if len(rows):
-            over_ranges(lambda a, b: collide.check(model, rows, margin, a, b, out, NONE), len(rows), GRAIN)
+            over_ranges(lambda a, b: collide.check(model, rows, margin, a, b, out), len(rows), GRAIN)
         return out.reshape(shape)
 
     def free(self, q: ArrayLike) -> BoolArray:
@@ -114,7 +111,7 @@ class CollisionModel(Arrangement):
         blocked = np.zeros(len(rows), np.int64)
         lanes, margin = self.lanes, self.clearance
         if len(rows):
-            if np.abs(rows).max(initial=0.0) > WHOLE_TURNS:
+            if np.abs(rows).max(initial=0.0) > sphere.WHOLE_TURNS:
                 return np.asarray(self.hits(q) < 0)
             over_ranges(lambda a, b: sphere.check_lanes(lanes, rows, margin, a, b, blocked), len(rows), LANE_GRAIN)
         if not lanes.decides[0]:
@@ -136,7 +133,7 @@ class CollisionModel(Arrangement):
         lanes, exact, margin = self.lanes, self.compiled, self.clearance
 
         def work(start: int, stop: int) -> None:
-            collide_edges.edges(exact, lanes, rows_a, rows_b, NONE, margin, step, start, stop, blocked)
+            collide_edges.edges(exact, lanes, rows_a, rows_b, margin, step, start, stop, blocked)
 
         if len(rows_a):
             over_ranges(work, len(rows_a), 1)

@@ -201,24 +201,37 @@ def block_hit(model, space, block, margin):
     return -1
 
 
+@kernel(borrow=True)
+def first_hit(model, q, margin, space):
+    """The first pair of shapes that is nearer than or at *margin* at ``q (n,)``, or −1."""
+    blocks, nodes, balls = model.blocks, model.nodes, space.balls
+    place(model, q, space)
+    for block in range(blocks.shape[0]):
+        if node_gap(nodes, balls, blocks[block, 0], blocks[block, 1]) <= margin:
+            found = block_hit(model, space, block, margin)
+            if found >= 0:
+                return found
+    return -1
+
+
 @kernel
-def check(model, q, margin, start, stop, out, hits):
-    """``out[i]`` = colliding pair of ``q[i]`` or −1; with ``hits (B,)``, count instead how often each block touches."""
+def check(model, q, margin, start, stop, out):
+    """``out[i]`` = colliding pair of ``q[i]`` or −1."""
+    space = make_space(model)
+    for i in range(start, stop):
+        out[i] = first_hit(model, q[i], margin, space)
+
+
+@kernel
+def count_hits(model, q, margin, start, stop, hits):
+    """``hits (B,)``: in how many of ``q[start:stop]`` each block touches."""
     space = make_space(model)
     blocks, nodes, balls = model.blocks, model.nodes, space.balls
-    counting = hits.shape[0] > 0
     for i in range(start, stop):
         place(model, q[i], space)
-        found = -1
         for block in range(blocks.shape[0]):
             if node_gap(nodes, balls, blocks[block, 0], blocks[block, 1]) <= margin:
-                found = block_hit(model, space, block, margin)
-                if found >= 0:
-                    if not counting:
-                        break
-                    hits[block] += 1
-        if not counting:
-            out[i] = found
+                hits[block] += 1 if block_hit(model, space, block, margin) >= 0 else 0
 
 
 @kernel

@@ -49,17 +49,11 @@ def scan_pieces(model, qa, qb, margin, resolution, space, rate, queue, count):
 
 
 @kernel
-def edges(exact, lanes, qa, qb, order, margin, resolution, start, stop, blocked):
-    """``blocked[i]``: 1 if the motion ``qa[i] → qb[i]`` hits anything, else 0.
-
-    With *order*, stop at the first free motion in that order; the rest counts as blocked.
-    """
+def edges(exact, lanes, qa, qb, margin, resolution, start, stop, blocked):
+    """``blocked[i]``: 1 if the motion ``qa[i] → qb[i]`` hits anything, else 0."""
     space = edge_space(exact, lanes, qa.shape[1])
-    for k in range(start, stop):
-        i = order[k] if order.shape[0] else k
+    for i in range(start, stop):
         blocked[i] = 1 if edge_blocked(exact, lanes, qa[i], qb[i], margin, resolution, space) else 0
-        if order.shape[0] and blocked[i] == 0:
-            return
 
 
 @kernel

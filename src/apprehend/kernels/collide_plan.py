@@ -63,16 +63,23 @@ def extend(exact, lanes, nodes, parent, count, q, stride, greedy, margin, resolu
 
 
 @kernel
-def grow(exact, lanes, nodes, parent, domain, count, samples, stride, widest, least, margin, resolution):
-    """Grow both trees with the configurations of ``samples (S, n)``; the smaller tree goes first.
+def grow(exact, lanes, nodes, parent, domain, count, samples, low, high, stride, widest, least, margin, resolution):
+    """Grow both trees with the configurations ``samples (S, n)``, given as shares of the way from *low* to *high*.
 
-    ``domain (2, C)``: how far from a node samples are of use to it. It is infinite until a motion from the node is
-    blocked, and then shrinks from *widest* to *least* with every such motion, so that nodes at a wall do not try to
-    pass it again and again (dynamic domain; Yershova, Jaillet, Siméon & LaValle 2005).
+    The smaller tree goes first. ``domain (2, C)``: how far from a node samples are of use to it. It is infinite until a
+    motion from the node is blocked, and then shrinks from *widest* to *least* with every such motion (both relative to
+    the diagonal of the box of samples), so that nodes at a wall do not try to pass it again and again (dynamic domain;
+    Yershova, Jaillet, Siméon & LaValle 2005).
     Returns ``(status, samples used)``; when connected, the last node of each tree is the same configuration.
     """
     space = edge_space(exact, lanes, samples.shape[1])
+    across = 0.0
+    for j in range(samples.shape[1]):
+        across += (high[j] - low[j]) ** 2
+    widest, least = widest * math.sqrt(across), least * math.sqrt(across)
     for s in range(samples.shape[0]):
+        for j in range(samples.shape[1]):
+            samples[s, j] = low[j] + samples[s, j] * (high[j] - low[j])
         one = 0 if count[0] <= count[1] else 1
         row, far = nearest_node(nodes[one], count[one], samples[s])
         if far > domain[one, row]:

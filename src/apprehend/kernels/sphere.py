@@ -20,6 +20,8 @@ from .lanes import LANES
 from .sphere_near import BOX, CYLINDER, at, mark_near, near, near_node, to_box, to_cylinder, to_grid, to_spheres
 from .vector import floor, load, select, some, store
 
+WHOLE_TURNS = 1e4  # joint values above this, in rad, are left to the exact check: lanes reduce angles to 1e5 only
+
 
 class SphereModel(NamedTuple):
     """Arrays: m joints, S spheres, K nodes, B pairs of nodes, O fixed shapes, C pairs of a node and a fixed shape."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, BoolArray, IntArray, as_shaped
 from ..collision import CollisionModel, Touch
 from ..errors import InputError
-from ..kernels import collide_plan
+from ..kernels import collide_plan, plan_ends
 from ..kinematics import Robot
 from .constrained import ConstrainedSearch
 from .constraints import PathConstraint
 from .keeping import Constraints
 from .result import PlanResult, PlanStatus
-from .search import SHORTCUTS, Search, first_direct, shortcut
+from .search import SHORTCUTS, Search, shortcut
 from .smoothing import smooth as smoothed
 
 MAX_NODES = 20_000
@@ -67,17 +67,15 @@ def plan(
     if not (math.isfinite(time_limit) and time_limit > 0.0):
         raise InputError(f"time_limit is {time_limit}; expected a positive number of seconds")
     moving = moving_joints(robot, joints)
-    targets[:, ~moving] = q0[~moving]
     keep = Constraints(robot, constraints, moving) if constraints else None
 
     task = _task(model, q0, targets, moving, keep)
     if isinstance(task, PlanResult):
         return task.timed(time.perf_counter() - began)
-    direct = _direct(model, task, keep)
-    if direct >= 0:
-        ends = np.stack([task.start, task.goals[direct]])
+    if task.reached >= 0:
+        ends = np.stack([task.start, task.goals[task.reached]])
         path = ends if (ends[0] != ends[1]).any() else ends[:1]
-        return PlanResult(PlanStatus.SUCCESS, path, direct, seconds=time.perf_counter() - began)
+        return PlanResult(PlanStatus.SUCCESS, path, task.reached, seconds=time.perf_counter() - began)
     until = time.perf_counter() + time_limit  # what was compiled until here does not count
     if keep is None:
         result = _free(model, task, rng, until, began, max_nodes, simplify)
@@ -88,8 +86,7 @@ def plan(
     return result.timed(time.perf_counter() - began)
 
 
-@dataclass(frozen=True, eq=False)
-class _Task:
+class _Task(NamedTuple):
     """A start, goals of which those numbered *usable* are free, and where to draw samples."""
 
     start: Array
@@ -97,6 +94,8 @@ class _Task:
     usable: IntArray
     low: Array
     high: Array
+    reached: int
+    """The nearest goal that a straight motion reaches, or −1."""
 
 
 def _task(
@@ -104,53 +103,55 @@ def _task(
 ) -> _Task | PlanResult:
     """What is to be planned, or the reason why there is nothing to plan."""
     robot, limits = model.robot, model.robot.limits
-    lower = np.where(moving, limits.lower, q0)
-    upper = np.where(moving, limits.upper, q0)
     if not len(targets):
         return PlanResult(PlanStatus.NO_GOAL)
-    turning = np.flatnonzero(moving & (limits.lower == -np.inf) & (limits.upper == np.inf))
-    if len(turning):
-        way = targets[:, turning] - q0[turning]
-        targets[:, turning] = q0[turning] + np.remainder(way + np.pi, 2.0 * np.pi) - np.pi
-    both = np.concatenate([q0[None], targets])
-    inside = np.clip(both, lower, upper)
-    within = np.abs(both - inside).max(axis=1) <= LIMIT_SLACK
-    if not within[0]:
-        return PlanResult(PlanStatus.START_OUT_OF_LIMITS, detail=f"{violated(robot, q0, lower, upper)}.")
-    if not within[1:].any():
-        worst = violated(robot, targets[0], lower, upper)
-        return PlanResult(PlanStatus.GOALS_OUT_OF_LIMITS, detail=f"Goal 0: {worst}.")
-    free = within & model.free(inside)
-    q0, targets = inside[0].copy(), inside[1:].copy()
-    if not free[0]:
-        touches = model.why(q0)
-        detail = f"{'; '.join(map(str, touches[:3]))}."
-        return PlanResult(PlanStatus.START_IN_COLLISION, detail=detail, touches=touches)
-    usable = np.flatnonzero(free[1:])
-    if not len(usable):
-        return _why_goals(model, targets, within[1:])
+    ends = np.concatenate([q0[None], targets])
+    state, box = np.empty(len(ends), np.int64), np.empty((2, robot.n))
+    reached = plan_ends.look(
+        model.compiled, model.lanes, ends, moving, limits.lower, limits.upper, LIMIT_SLACK, model.clearance,
+        model.resolution, keep is None, state, box,
+    )  # fmt: skip
+    usable = np.flatnonzero(state[1:] == plan_ends.GOOD)
+    if state[0] != plan_ends.GOOD or not len(usable):
+        return _why_not(model, q0, targets, moving, ends, state)
+    start, goals = ends[0], ends[1:]
     if keep is not None:
-        if why := keep.why(q0):
+        if why := keep.why(start):
             return PlanResult(PlanStatus.START_OFF_CONSTRAINT, detail=f"{why}.")
-        kept = keep.violation(targets[usable]) <= 0.0
+        kept = keep.violation(goals[usable]) <= 0.0
         if not kept.any():
             first = int(usable[0])
-            return PlanResult(PlanStatus.GOALS_OFF_CONSTRAINT, detail=f"Goal {first}: {keep.why(targets[first])}.")
+            return PlanResult(PlanStatus.GOALS_OFF_CONSTRAINT, detail=f"Goal {first}: {keep.why(goals[first])}.")
         usable = usable[kept]
-    if not np.isfinite(upper - lower).all():  # joints without limits: half a turn around the start and the goals
-        span = np.concatenate([q0[None], targets[usable]])
-        lower = np.where(np.isfinite(lower), lower, span.min(axis=0) - np.pi)
-        upper = np.where(np.isfinite(upper), upper, span.max(axis=0) + np.pi)
-    return _Task(q0, targets, usable, lower, upper)
+        reached = _direct(model, keep, start, goals, usable)
+    return _Task(start, goals, usable, box[0], box[1], int(reached))
 
 
-def _direct(model: CollisionModel, task: _Task, keep: Constraints | None) -> int:
-    """The nearest goal that a straight motion reaches, or −1."""
-    near = np.argsort(((task.goals[task.usable] - task.start) ** 2).sum(axis=1), kind="stable")
-    order = task.usable[near]
-    if keep is not None:
-        order = order[keep.hold(np.repeat(task.start[None], len(order), axis=0), task.goals[order])]
-    return first_direct(model, task.start, task.goals, order)
+def _why_not(
+    model: CollisionModel, q0: Array, targets: Array, moving: BoolArray, ends: Array, state: IntArray
+) -> PlanResult:
+    """Why the start or all of the goals cannot be used."""
+    robot, limits = model.robot, model.robot.limits
+    lower, upper = np.where(moving, limits.lower, q0), np.where(moving, limits.upper, q0)
+    if state[0] == plan_ends.BEYOND:
+        return PlanResult(PlanStatus.START_OUT_OF_LIMITS, detail=f"{violated(robot, q0, lower, upper)}.")
+    within = state[1:] != plan_ends.BEYOND
+    if not within.any():
+        worst = violated(robot, np.where(moving, targets[0], q0), lower, upper)
+        return PlanResult(PlanStatus.GOALS_OUT_OF_LIMITS, detail=f"Goal 0: {worst}.")
+    if state[0] == plan_ends.BLOCKED:
+        touches = model.why(ends[0])
+        detail = f"{'; '.join(map(str, touches[:3]))}."
+        return PlanResult(PlanStatus.START_IN_COLLISION, detail=detail, touches=touches)
+    return _why_goals(model, ends[1:], within)
+
+
+def _direct(model: CollisionModel, keep: Constraints, start: Array, goals: Array, usable: IntArray) -> int:
+    """The nearest goal that a straight motion reaches and that keeps the constraints, or −1."""
+    order = usable[np.argsort(((goals[usable] - start) ** 2).sum(axis=1), kind="stable")]
+    starts = np.repeat(start[None], len(order), axis=0)
+    free = order[keep.hold(starts, goals[order]) & model.edges_free(starts, goals[order])]
+    return int(free[0]) if len(free) else -1
 
 
 def _free(

@@ -7,10 +7,10 @@ import time
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, IntArray, as_shaped
+from ..arrays import Array, as_shaped
 from ..collision import CollisionModel
 from ..errors import InputError
-from ..kernels import collide_edges, collide_plan
+from ..kernels import collide_plan
 
 STRIDE = 1.5
 """Largest step of a tree in joint space, in rad (and m)."""
@@ -23,16 +23,6 @@ FIRST_ROOM = 512
 
 SHORTCUTS = 100
 """Random shortcuts that are tried on a path."""
-
-
-def first_direct(model: CollisionModel, start: Array, goals: Array, order: IntArray) -> int:
-    """The first of *goals* in *order* that a straight motion reaches, or −1."""
-    starts = np.repeat(start[None], len(goals), axis=0)
-    blocked = np.ones(len(goals), np.int64)
-    limits = model.clearance, model.resolution
-    collide_edges.edges(model.compiled, model.lanes, starts, goals, order, *limits, 0, len(order), blocked)
-    free = order[blocked[order] == 0]
-    return int(free[0]) if len(free) else -1
 
 
 class Search:
@@ -52,17 +42,13 @@ class Search:
         self.chunk = 192
         self.compiling = 0.0  # seconds that went into compiling the kernel, in the first run of its kind
 
-    def grow(self, rng: np.random.Generator, lower: Array, upper: Array) -> int:
+    def grow(self, rng: np.random.Generator, low: Array, high: Array) -> int:
         """Try one more portion of random configurations."""
-        samples = rng.random((self.chunk, len(lower)))
-        samples *= upper - lower
-        samples += lower
-        across = float(np.linalg.norm(upper - lower))
+        samples = rng.random((self.chunk, len(low)))
         began, known = time.perf_counter(), len(collide_plan.grow.overloads)
         status, used = collide_plan.grow(
-            self.model.compiled, self.model.lanes,
-            self.nodes, self.parent, self.domain, self.count,
-            samples, STRIDE, WIDEST * across, LEAST * across, self.model.clearance, self.model.resolution,
+            self.model.compiled, self.model.lanes, self.nodes, self.parent, self.domain, self.count,
+            samples, low, high, STRIDE, WIDEST, LEAST, self.model.clearance, self.model.resolution,
         )  # fmt: skip
         if len(collide_plan.grow.overloads) > known:
             self.compiling += time.perf_counter() - began
