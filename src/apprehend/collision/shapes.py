@@ -151,21 +151,17 @@ def _hull(points: Array) -> tuple[IntArray, IntArray]:
     """Indices of the vertices of the convex hull and its faces among them; flat sets keep all points, without faces."""
     from scipy.spatial import ConvexHull, QhullError
 
-    points_kept = np.unique(points, axis=0, return_index=True)[1]
-    if len(points_kept) >= 4:
-        try:
-            hull = ConvexHull(points[points_kept])
-        except QhullError:
-            return points_kept, np.zeros((0, 3), np.int64)
-        number = np.full(len(points_kept), -1)
-        number[hull.vertices] = np.arange(len(hull.vertices))
-        faces = number[hull.simplices].astype(np.int64)
-        kept: IntArray = points_kept[hull.vertices]
-        p = points[kept][faces]
-        inward = np.einsum("fi,fi->f", np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), hull.equations[:, :3]) < 0.0
-        faces[inward] = faces[inward][:, ::-1]
-        return kept, faces
-    return points_kept, np.zeros((0, 3), np.int64)
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):  # flat, or too few
+        return np.unique(points, axis=0, return_index=True)[1], np.zeros((0, 3), np.int64)
+    number = np.full(len(points), -1)
+    number[hull.vertices] = np.arange(len(hull.vertices))
+    faces = number[hull.simplices].astype(np.int64)
+    p = points[hull.vertices][faces]
+    inward = np.einsum("fi,fi->f", np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), hull.equations[:, :3]) < 0.0
+    faces[inward] = faces[inward][:, ::-1]
+    return hull.vertices.astype(np.int64), faces
 
 
 def hulls(pieces: Iterable[tuple[Array, IntArray]]) -> tuple[Convex, ...]:
