@@ -6,6 +6,7 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -294,14 +295,22 @@ class Grid(Geometry):
         return Cloud(points, 0.0, self.pose)
 
 
+KNOWN: WeakKeyDictionary[object, tuple[Geometry, ...]] = WeakKeyDictionary()
+"""The shapes of the bodies and fields that are in use, which are values."""
+
+
 def as_geometry(thing: object, name: str = "shape") -> tuple[Geometry, ...]:
     """Geometry, a sequence of it, a body (its convex pieces) or a body's distance field, as geometry."""
     if isinstance(thing, Geometry):
         return (thing,)
     if hasattr(thing, "convex_pieces"):
-        return hulls(thing.convex_pieces)
+        if thing not in KNOWN:
+            KNOWN[thing] = hulls(thing.convex_pieces)
+        return KNOWN[thing]
     if hasattr(thing, "values") and hasattr(thing, "spacing") and hasattr(thing, "origin"):
-        return (Grid.of(thing),)
+        if thing not in KNOWN:
+            KNOWN[thing] = (Grid.of(thing),)
+        return KNOWN[thing]
     if isinstance(thing, Sequence) and thing and not isinstance(thing, str):
         return tuple(part for item in thing for part in as_geometry(item, name))
     raise InputError(
