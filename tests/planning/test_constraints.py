@@ -39,8 +39,8 @@ def some(frame: str, T: np.ndarray):
 
 def test_values_change_as_their_derivatives_say(ur5e: Robot) -> None:
     rng = np.random.default_rng(0)
+    items = some("tool0", ur5e.fk(ur5e.home, "tool0"))
     q = ur5e.home + 0.3 * rng.normal(size=6)
-    items = some("tool0", ur5e.fk(q, "tool0"))
     for item in items:
         _, rows = item.values(ur5e.fk(q, "tool0"))
         exact = rows @ ur5e.jacobian(q, "tool0", "mixed")
@@ -49,6 +49,78 @@ def test_values_change_as_their_derivatives_say(ur5e: Robot) -> None:
             e = step * np.eye(6)[j]
             ahead, behind = (item.values(ur5e.fk(q + sign * e, "tool0"))[0] for sign in (1, -1))
             np.testing.assert_allclose((ahead - behind) / (2.0 * step), exact[:, j], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["panda", "tiago_dual", "scara", "allegro_right"])
+def test_compiled_values_are_those_of_the_definitions(name: str) -> None:
+    """On trees with two arms, sliding joints and joints without limits."""
+    robot = Robot.load(name)
+    rng = np.random.default_rng(4)
+    lower, upper = np.maximum(robot.limits.lower, -3.0), np.minimum(robot.limits.upper, 3.0)
+    q = rng.uniform(lower, upper, (30, robot.n))
+    frames = [f for f in robot.frame_names if len(robot.chain(f))]
+    items = [item for f in (frames[0], frames[-1]) for item in some(f, robot.fk(q[0], f))]
+    value = Constraints(robot, items).values(q)
+    for k, item in enumerate(items):
+        exact, _ = item.values(robot.fk(q, item.frame))
+        np.testing.assert_allclose(value[:, k, : exact.shape[1]], exact, atol=1e-9)
+        assert not value[:, k, exact.shape[1] :].any()
+
+
+def test_motions_are_proven_on_any_robot_and_nothing_wrong_is() -> None:
+    rng = np.random.default_rng(6)
+    for name, frame in (("panda", "panda_hand"), ("tiago_dual", "arm_left_7_link"), ("scara", "tool")):
+        robot = Robot.load(name)
+        frame = frame if frame in robot.frame_names else robot.frame_names[-1]
+        lower, upper = np.maximum(robot.limits.lower, -2.0), np.minimum(robot.limits.upper, 2.0)
+        middle = rng.uniform(lower, upper)
+        qa = np.clip(middle + 0.15 * rng.normal(size=(80, robot.n)), lower, upper)
+        qb = np.clip(qa + 0.15 * rng.normal(size=(80, robot.n)), lower, upper)
+        for item in some(frame, robot.fk(middle, frame)):
+            keep = Constraints(robot, [item])
+            held = keep.hold(qa, qb)
+            low, high = item.bounds
+            for a, b, good in zip(qa, qb, held, strict=True):
+                value, _ = item.values(robot.fk(dense(np.array([a, b])), frame))
+                worst = np.maximum(low - value, value - high).max()
+                assert worst <= 1e-8 if good else worst > -2e-3
+
+
+def test_a_motion_off_a_bound_is_proven_only_inwards() -> None:
+    robot = planar(2)
+    start, away = np.array([0.3, 0.4]), np.array([0.2, 0.1])
+    T = robot.fk(start, "tip")
+    x, y = T[0, 3], T[1, 3]
+    tilt = float(np.arccos(T[0, 0]))
+    for item in (
+        Upright("tip", (1.0, 0.0, 0.0), tilt, (1.0, 0.0, 0.0)),
+        Inside("tip", (x, -9.0, -1.0), (9.0, y, 1.0)),
+        Turned("tip", np.eye(3), (0.1, 0.1, tilt)),
+    ):
+        keep = Constraints(robot, [item])
+        ends = np.array([start - away, start + away])
+        np.testing.assert_array_equal(keep.hold(np.array([start, start]), ends), [True, False])
+        np.testing.assert_array_equal(keep.hold(ends, np.array([start, start])), [True, False])
+
+
+def test_a_frame_may_turn_around_where_that_is_allowed() -> None:
+    """With a tolerance of π about one axis the rotation vector flips its sign half-way."""
+    robot = planar(1)
+    keep = Constraints(robot, [Turned("tip", np.diag([-1.0, -1.0, 1.0]), (0.1, 0.1, np.pi))])
+    assert keep.hold(np.array([[-1.0]]), np.array([[1.0]]))[0]
+    narrow = Constraints(robot, [Turned("tip", np.diag([-1.0, -1.0, 1.0]), (0.1, 0.1, 3.0))])
+    assert not narrow.hold(np.array([[-1.0]]), np.array([[1.0]]))[0]
+
+
+def test_joints_that_do_not_tilt_an_axis_cost_nothing(ur5e: Robot) -> None:
+    """The first joint turns about the vertical, the last about the tool: any motion of both keeps a narrow cone."""
+    keep = Constraints(ur5e, [Upright("tool0", axis=(0.0, 0.0, -1.0), angle=1e-4)])
+    q = np.array([-3.0, -1.2, 1.5, 0.0, -0.5 * np.pi, -3.0])
+    q[3] = -0.5 * np.pi - q[1] - q[2]
+    assert keep.violation(q) == 0.0
+    far = q + np.array([6.0, 0.0, 0.0, 0.0, 0.0, 6.0])
+    assert keep.hold(q[None], far[None])[0]
+    np.testing.assert_array_equal(np.flatnonzero(keep.compiled.levers[0]), [1, 2, 3, 4])
 
 
 def test_what_is_proven_along_a_motion_holds_everywhere_on_it(ur5e: Robot) -> None:
@@ -78,6 +150,28 @@ def test_projection_ends_on_the_constraints(ur5e: Robot) -> None:
     still = np.array([True, True, False, True, True, True])
     moved, _ = Constraints(ur5e, keep.items, still).project(q, lower, upper)
     np.testing.assert_array_equal(moved[:, 2], q[:, 2])
+
+
+def test_two_arms_keep_what_one_of_them_holds() -> None:
+    robot = Robot.load("tiago_dual")
+    frame = "arm_left_7_link"
+    rng = np.random.default_rng(0)
+    model = model_of(robot, Box("post", np.array([0.1, 0.1, 1.2]), pose(0.6, 0.35, 0.6)))
+    lower, upper = np.maximum(robot.limits.lower, -np.pi), np.minimum(robot.limits.upper, np.pi)
+    keep = Constraints(robot, [Upright(frame, angle=0.3)])
+    q, good = keep.project(rng.uniform(lower, upper, (4000, robot.n)), lower, upper)
+    q = q[good & model.free(q)]
+    arms = [j for f in (frame, "arm_right_7_link") for j in robot.chain(f)]
+    ends = q[:2].copy()
+    ends[1] = np.where(np.isin(np.arange(robot.n), arms), ends[1], ends[0])
+    result = plan(
+        model, *ends, rng=rng, constraints=keep.items, joints=sorted(set(arms)), time_limit=20.0
+    ).require_success()
+    points = dense(result.path, 50)
+    assert keep.violation(points).max() == 0.0
+    assert (model.distance(points) > -model.resolution).all()
+    still = np.setdiff1d(np.arange(robot.n), arms)
+    assert (points[:, still] == ends[0, still]).all()
 
 
 def test_a_full_mug_goes_around_a_wall_upright(ur5e: Robot) -> None:
@@ -120,6 +214,11 @@ def test_ends_off_the_constraint_are_named() -> None:
     assert "tip is tilted by 85.9°, allowed are 5.7°" in tilted.explain()
     turned = plan(model, inside, outside, rng=rng, constraints=[Turned("tip", np.eye(3), 0.1)])
     assert "tip is turned by [0.0, 0.0, 85.9]°" in turned.explain()
+    assert "away keeps the constraint" in turned.explain()
+    above = Inside("tip", (0.0, 2.0, -1.0), (1.0, 3.0, 1.0))
+    nowhere = plan(model, outside, inside, rng=rng, constraints=[box, above])
+    assert nowhere.status is PlanStatus.START_OFF_CONSTRAINT
+    assert "could be moved onto all constraints: they may exclude one another" in nowhere.explain()
 
 
 def test_what_no_path_can_keep_ends_in_time() -> None:

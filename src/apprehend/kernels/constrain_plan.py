@@ -21,7 +21,7 @@ from .lane_edges import edge_blocked, edge_space
 REACHED, STOPPED, NO_ROOM = 0, 1, 2
 
 KEPT, BLOCKED, LEFT = 0, 1, 2
-"""What is counted: motions that are kept, that hit something, that leave the constraints."""
+"""What becomes of a step: it is kept, it hits something, it leaves the constraints; counted in ``tally (3,)``."""
 
 NEARER = 0.25  # of a step, by which it must come nearer to where it goes
 
@@ -49,14 +49,13 @@ def distance(a, b):
 
 
 @kernel(inline=True)
-def passes(task, qa, qb, edge, space, tally):
+def passes(task, qa, qb, edge, space):
     """What becomes of the straight motion ``qa → qb``: `KEPT`, `BLOCKED` or `LEFT`."""
     outcome = LEFT
     if holds(task.keep, qa, qb, space):
         outcome = KEPT
         if edge_blocked(task.exact, task.lanes, qa, qb, task.scale[2], task.scale[3], edge):
             outcome = BLOCKED
-    tally[outcome] += 1
     return outcome
 
 
@@ -88,7 +87,8 @@ def reach(task, nodes, parent, count, row, goal, edge, space, tally):
     while count < nodes.shape[0] and far > 0.0:
         outcome = LEFT
         if step_towards(task, nodes[row], goal, far, stride, nodes[count], space):
-            outcome = passes(task, nodes[row], nodes[count], edge, space, tally)
+            outcome = passes(task, nodes[row], nodes[count], edge, space)
+        tally[outcome] += 1
         stride = min(stride, far)
         if outcome == KEPT:
             parent[count] = row
@@ -140,12 +140,12 @@ def grow(task, nodes, parent, domain, count, samples, ends, tally, target, edge,
 
 
 @kernel(inline=True)
-def thin(task, path, count, edge, space, tally):
+def thin(task, path, count, edge, space):
     """Drop vertices that a straight motion can pass by, the farthest leaps first; the new count."""
     i, kept = 0, 1
     while i < count - 1:
         k = min(count - 1, i + LEAP)
-        while k > i + 1 and passes(task, path[kept - 1], path[k], edge, space, tally) != KEPT:
+        while k > i + 1 and passes(task, path[kept - 1], path[k], edge, space) != KEPT:
             k -= 1
         for j in range(path.shape[1]):
             path[kept, j] = path[k, j]
@@ -207,7 +207,7 @@ def search(task, nodes, parent, domain, count, samples, path, pairs, ends, tally
         return grow(task, nodes, parent, domain, count, samples, ends, tally, target, edge, space)
     way, rest, parents, vertices = np.empty_like(path), np.empty_like(path), np.zeros(path.shape[0], np.int64), count[0]
     for last in range(2):
-        vertices = thin(task, path, vertices, edge, space, tally)
+        vertices = thin(task, path, vertices, edge, space)
         if last == 0:
             vertices = shorten(task, path, vertices, pairs, way, rest, parents, target, edge, space, tally)
     return MORE, vertices

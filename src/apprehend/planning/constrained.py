@@ -100,6 +100,14 @@ class ConstrainedSearch:
         """Whether there is no room for more nodes."""
         return bool(self.count.max() >= self.most)
 
+    def told(self) -> str:
+        """What became of the steps."""
+        share = 100.0 * self.tally / max(int(self.tally.sum()), 1)
+        return (
+            f"of {self.tally.sum()} steps {share[constrain_plan.LEFT]:.0f} % left the constraints and "
+            f"{share[constrain_plan.BLOCKED]:.0f} % hit something"
+        )
+
     def _way(self, k: int, row: int) -> tuple[Array, int]:
         rows = [row]
         while self.parent[k, rows[-1]] >= 0:

@@ -24,6 +24,9 @@ ROUNDING = 1e-9
 PARALLEL = 1e-12
 """Sine of the angle between axes that count as parallel."""
 
+ATTEMPTS = 256
+"""Random configurations that are tried before it is said that none keeps the constraints."""
+
 GRAIN = 64
 """Smallest share of a batch that is worth a thread."""
 
@@ -52,14 +55,29 @@ class Constraints:
         return worst
 
     def why(self, q: Array) -> str:
-        """Which constraint ``q (n,)`` violates, in words; empty: none."""
+        """Which constraint ``q (n,)`` violates and what is known of others that keep all; empty: none."""
         value, floats = self.values(q), self.compiled.floats
         low, high = floats[:, constrain.LOW : constrain.HIGH], floats[:, constrain.HIGH : constrain.SLACK]
         beyond = np.maximum(low - value, value - high).max(axis=-1, initial=0.0)
-        for item, v, b in zip(self.items, value, beyond, strict=True):
-            if b > 0.0:
-                return item.words(v)
-        return ""
+        if not (beyond > 0.0).any():
+            return ""
+        first = int(np.argmax(beyond > 0.0))
+        return f"{self.items[first].words(value[first])}; {self._elsewhere(q)}"
+
+    def _elsewhere(self, q: Array) -> str:
+        limits, many = self.robot.limits, len(self.items) > 1
+        what = "all constraints" if many else "the constraint"
+        near, good = self.project(q[None], limits.lower, limits.upper)
+        if good[0]:
+            return f"a configuration {np.linalg.norm(near[0] - q):.2g} (rad, m) away keeps {what}"
+        wide = np.where(self.moving, np.pi, 0.0)
+        lower = np.where(np.isfinite(limits.lower), np.where(self.moving, limits.lower, q), q - wide)
+        upper = np.where(np.isfinite(limits.upper), np.where(self.moving, limits.upper, q), q + wide)
+        tried = np.random.default_rng(0).uniform(lower, upper, (ATTEMPTS, len(q)))
+        if self.project(tried, lower, upper)[1].any():
+            return f"no configuration near it keeps {what}"
+        more = ": they may exclude one another" if many else ""
+        return f"none of {ATTEMPTS} random configurations could be moved onto {what}{more}"
 
     def hold(self, qa: Array, qb: Array) -> BoolArray:
         """Whether the constraints hold all along each straight motion ``(N, n)``: proven (`kernels.constrain_hold`)."""

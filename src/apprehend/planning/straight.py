@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, as_pose, as_shaped
-from ..collision import CollisionModel
+from ..collision import CollisionModel, Convex
+from ..collision.nodes import Node, ancestors, matrix, reach
 from ..collision.rotations import matrix_quaternion, quaternion_matrix
 from ..errors import InputError
 from ..kinematics import Robot
@@ -31,7 +32,7 @@ LEAP = 0.35
 """Largest change of one joint between waypoints, in rad: more is a change of branch."""
 
 DEVIATION = 5e-4
-"""Largest distance in m of the tool from the line half-way between two waypoints; more halves the step."""
+"""Largest distance in m of the tool from the line between two waypoints, proven; more halves the step."""
 
 
 def straight(
@@ -49,9 +50,9 @@ def straight(
 
     Position and rotation are interpolated evenly (the rotation about one fixed axis); every waypoint is solved by
     damped Newton steps from the last one within the joint limits, so that the arm stays on its branch. Between
-    waypoints the tool deviates from the line by at most `DEVIATION`. *model* None: no check of collision; *touching*
-    are pairs of names that may touch on the way. When it fails, the path up to there is in the answer, ``progress``
-    says how far that is, and ``detail`` why it ends.
+    waypoints the tool deviates from the line by at most `DEVIATION` (proven: `Bend`). *model* None: no check of
+    collision; *touching* are pairs of names that may touch on the way. When it fails, the path up to there is in the
+    answer, ``progress`` says how far that is, and ``detail`` why it ends.
     """
     began = time.perf_counter()
     q = as_shaped(start, "start", robot.n)
@@ -81,7 +82,7 @@ def straight(
     line = Line(robot.fk(q, frame), target)
     path, places = [q.copy()], [0.0]
     ds = 1.0 / max(1, math.ceil(max(line.distance, line.angle / TURN_PER_METRE) / step))
-    smallest = ds / 64.0
+    largest, smallest, bend = ds, ds / 64.0, Bend(robot, frame)
     s = 0.0
     while s < 1.0:
         ahead = min(1.0, s + ds)
@@ -90,7 +91,7 @@ def straight(
         q_next, residual = track(robot, path[-1], frame, line.at(ahead), free)
         leap = float(np.abs(q_next - path[-1]).max())
         reached = residual <= TOLERANCE
-        good = reached and leap <= LEAP and _near_line(robot, path[-1], q_next, frame, line, 0.5 * (s + ahead))
+        good = reached and leap <= LEAP and bend(path[-1], q_next) <= DEVIATION - 2.0 * TOLERANCE
         if not good:
             if ds > smallest:
                 ds *= 0.5
@@ -109,7 +110,7 @@ def straight(
             )
         path.append(q_next)
         places.append(ahead)
-        s = ahead
+        s, ds = ahead, min(2.0 * ds, largest)
     if model is None:
         return answer(PlanStatus.SUCCESS, path, 1.0)
     rows = np.array(path)
@@ -190,9 +191,26 @@ def pose_error(T: Array, target: Array) -> Array:
     return np.concatenate([target[:3, 3] - T[:3, 3], turn * q[1:]])
 
 
-def _near_line(robot: Robot, a: Array, b: Array, frame: str, line: Line, s: float) -> bool:
-    middle: Array = robot.fk(0.5 * (a + b), frame)[:3, 3]
-    return float(np.linalg.norm(middle - line.at(s)[:3, 3])) <= DEVIATION
+class Bend:
+    """How far a frame's origin can leave the chord while the joints move straight from one configuration to another.
+
+    ``|p − chord| ≤ max |p''| / 8`` and ``|p''| ≤ Σᵢⱼ |q̇ᵢ q̇ⱼ| l``, l the farthest that the origin can be from the axis
+    of the outer of the two joints (1 for one that slides).
+    """
+
+    def __init__(self, robot: Robot, frame: str):
+        tree, f = robot.model, robot.frame_index(frame)
+        carrier = int(tree.frame_joint[f])
+        origin = Node("origin", carrier, (Convex.sphere(1e-9).at(matrix(tree.frame_place[f])),))
+        chain = np.array(ancestors(tree, carrier)[::-1], np.int64)
+        self.coordinate, self.gain = tree.coordinate[chain], np.abs(tree.gain[chain, 0])
+        self.lever, self.turning = reach(tree, robot, origin)[chain], tree.kind[chain] == 0
+
+    def __call__(self, a: Array, b: Array) -> float:
+        """The bound in m."""
+        v = self.gain * np.abs(b - a)[self.coordinate]
+        turned = np.where(self.turning, v, 0.0)
+        return float((v * self.lever) @ (2.0 * np.cumsum(turned) - turned)) / 8.0
 
 
 def _at_limit(robot: Robot, q: Array, free: IntArray) -> str:
