@@ -53,6 +53,8 @@ CLIMB_FROM = 24
 
 MAX_STEPS = 200
 TINY = 1e-14
+STALLS = 4  # steps that improve neither bound, at most
+ROUNDED = 1.0 + 1e-15  # squared distances grow by less than this from one step to the next: no more than rounding
 
 
 @kernel(fast=False, borrow=True)
@@ -272,7 +274,8 @@ def gjk(ints, floats, points, graph, a, b, ws, above, below, relative_gap):
     Stops as soon as the distance is known to be above *above*, or at most *below*, or within a relative gap.
     Returns ``(rows, lower, upper)``: bounds on the distance (both 0 when the cores overlap), and the rows of ``ws``
     that carry the nearest points with weights ``ws[BARY]``. ``ws[AXIS]`` is the first direction tried and receives the
-    last one, from b towards a in the frame of a.
+    best one, from b towards a in the frame of a, as long as *upper*. (The squared length of the nearest point settles
+    to rounding long before its direction does: steps go on until *lower* has settled, too.)
     """
     rel, bary, axis = ws[REL], ws[BARY], ws[AXIS]
     vx, vy, vz = axis[0], axis[1], axis[2]
@@ -285,27 +288,33 @@ def gjk(ints, floats, points, graph, a, b, ws, above, below, relative_gap):
     lower = max(0.0, (vx * ws[0, 0] + vy * ws[0, 1] + vz * ws[0, 2]) / norm)
     if lower > above:
         return 0, lower, 1e300
+    nx, ny, nz = vx, vy, vz  # the direction that lower belongs to
     bary[0] = 1.0
     n = 1
     vx, vy, vz = ws[0, 0], ws[0, 1], ws[0, 2]
     vv = vx * vx + vy * vy + vz * vz
     size = vv
+    stalled = 0
     for _ in range(MAX_STEPS):
         upper = math.sqrt(vv)
         if vv <= TINY * TINY * size or upper <= below:
             break
         difference(ints, floats, points, graph, a, b, -vx, -vy, -vz, ws, ws[n])
         wx, wy, wz = ws[n, 0], ws[n, 1], ws[n, 2]
-        vw = vx * wx + vy * wy + vz * wz
-        lower = max(lower, vw / upper)
-        if lower > above or upper - lower <= relative_gap * upper:
+        now = (vx * wx + vy * wy + vz * wz) / upper
+        if now > lower * (1.0 - 1e-14):  # of equals the last: it belongs to the points
+            nx, ny, nz = vx, vy, vz
+            if now > lower:
+                lower = now
+                stalled = 0
+        if lower > above or upper - lower <= relative_gap * upper or stalled > STALLS:
             break
         repeated = False
         for i in range(n):
             if ws[i, 0] == wx and ws[i, 1] == wy and ws[i, 2] == wz:
                 repeated = True
         if repeated:
-            lower = upper if upper - lower <= 1e-9 * upper + 1e-13 * math.sqrt(size) else lower
+            lower = upper if upper - lower <= 1e-13 * math.sqrt(size) else lower
             break
         size = max(size, wx * wx + wy * wy + wz * wz)
         for i in range(n):
@@ -322,18 +331,21 @@ def gjk(ints, floats, points, graph, a, b, ws, above, below, relative_gap):
             y += bary[i] * ws[i, 1]
             z += bary[i] * ws[i, 2]
         new = x * x + y * y + z * z
-        if new >= vv:  # rounding: the step before was the best
-            for i in range(n):
-                bary[i] = bary[4 + i]
-                for c in range(9):
-                    ws[i, c] = ws[5 + i, c]
-            break
+        if new >= vv:
+            stalled += 1
+            if new > vv * ROUNDED:  # the step before was the best
+                for i in range(n):
+                    bary[i] = bary[4 + i]
+                    for c in range(9):
+                        ws[i, c] = ws[5 + i, c]
+                break
         n = rows
         vx, vy, vz, vv = x, y, z, new
     upper = math.sqrt(vv)
     if vv <= TINY * TINY * size:
         return n, 0.0, 0.0
-    axis[0], axis[1], axis[2] = vx, vy, vz
+    scale = upper / math.sqrt(nx * nx + ny * ny + nz * nz)
+    axis[0], axis[1], axis[2] = scale * nx, scale * ny, scale * nz
     return n, min(lower, upper), upper
 
 

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from ._jit import kernel
-from .gjk import AXIS, BARY, NEAR, ROWS, difference, gjk, nearest_on_triangle, witnesses
+from .gjk import AXIS, BARY, NEAR, ROWS, difference, nearest_on_triangle
 
 MAX_POINTS = 260
 MAX_FACES = 1024
@@ -140,8 +140,8 @@ def tetrahedron(ints, floats, points, graph, a, b, ws, P, n, across):
 def depth(ints, floats, points, graph, a, b, ws, n, big):
     """Penetration depth of the cores, given the simplex of *n* rows of ``ws`` around the origin.
 
-    Returns ``(lower, upper)``. ``ws[AXIS]`` is the unit direction in which a must move by the depth to come free of b
-    (in the frame of a); ``ws[NEAR]`` holds the deepest points.
+    Returns it, and whether a face of the polytope proves it. ``ws[AXIS]`` is the unit direction in which a must move by
+    the depth to come free of b (in the frame of a); ``ws[NEAR]`` holds the deepest points.
     """
     P, F, axis = big[:MAX_POINTS], big[MAX_POINTS:], ws[AXIS]
     for i in range(n):
@@ -149,7 +149,7 @@ def depth(ints, floats, points, graph, a, b, ws, n, big):
             P[i, c] = ws[i, c]
     dim = tetrahedron(ints, floats, points, graph, a, b, ws, P, n, ws[4])
     if dim < 4:
-        return 0.0, 0.0  # flat: the nearest points stay what they are
+        return 0.0, True  # flat: the nearest points stay what they are
     inner = ws[4]
     for c in range(3):
         inner[c] = 0.25 * (P[0, c] + P[1, c] + P[2, c] + P[3, c])
@@ -180,21 +180,19 @@ def depth(ints, floats, points, graph, a, b, ws, n, big):
             break
         count += 1
     deepest(P, F, faces, best, ws)
-    if best - low > 1e-9 * best + 1e-13 * size:
-        best = polish(ints, floats, points, graph, a, b, ws, P[0], best)
-    return min(low, best), best
+    if best - low <= 1e-9 * best + 1e-13 * size:
+        return best, True
+    return polish(ints, floats, points, graph, a, b, ws, P[0], best), False
 
 
-@kernel(fast=False)
+@kernel(fast=False, borrow=True)
 def polish(ints, floats, points, graph, a, b, ws, row, best):
-    """A direction near ``ws[AXIS]`` with the least depth: a search along shrinking crosses, for round shapes.
+    """The least depth along a direction near ``ws[AXIS]``, which follows: a search along shrinking crosses.
 
-    The polytope has too few points for faces that are curved in two directions at once. Returns the depth there;
-    ``ws[NEAR]`` follows where the farthest points in that direction lie opposite each other.
+    For round shapes: the polytope has too few points for faces that are curved in two directions at once.
     """
     axis = ws[AXIS]
     step = 0.02
-    found = False
     while step > 1e-10:
         ux, uy, uz = axis[1], -axis[0], 0.0
         if abs(axis[2]) > 0.7:
@@ -215,31 +213,10 @@ def polish(ints, floats, points, graph, a, b, ws, row, best):
                 best = max(h, 0.0)
                 axis[0], axis[1], axis[2] = x, y, z
                 moved = True
-                away = (row[0] + h * x) ** 2 + (row[1] + h * y) ** 2 + (row[2] + h * z) ** 2
-                if away <= 1e-10 * h * h:
-                    found = True
-                    for i in range(6):
-                        ws[NEAR, i] = row[3 + i]
-                else:
-                    found = False
                 break
         if not moved:
             step *= 0.5
-    if not found:
-        lift(ws, best)
     return best
-
-
-@kernel(fast=False)
-def lift(ws, depth):
-    """Move the deepest points apart along the axis until they are *depth* apart along it."""
-    axis, near = ws[AXIS], ws[NEAR]
-    apart = 0.0
-    for c in range(3):
-        apart += axis[c] * (near[3 + c] - near[c])
-    for c in range(3):
-        near[c] -= 0.5 * (depth - apart) * axis[c]
-        near[3 + c] += 0.5 * (depth - apart) * axis[c]
 
 
 @kernel(fast=False, borrow=True)
@@ -298,27 +275,3 @@ def deepest(P, F, faces, height, ws):
             best = d
             for c in range(6):
                 ws[NEAR, c] = bary[0] * ws[0, 3 + c] + bary[1] * ws[1, 3 + c] + bary[2] * ws[2, 3 + c]
-
-
-@kernel(fast=False, borrow=True)
-def signed_distance(ints, floats, points, graph, a, b, ws, big):
-    """Signed distance of shapes *a* and *b* (negative: depth); ``ws[REL]`` holds the pose of b in a.
-
-    ``ws[NEAR]`` receives the witness points on the surfaces and ``ws[AXIS]`` the unit normal from b to a, all in the
-    frame of a.
-    """
-    rows, _, upper = gjk(ints, floats, points, graph, a, b, ws, 1e300, 0.0, 1e-13)
-    ra, rb = floats[a, 3], floats[b, 3]
-    if rows < 4:
-        witnesses(ws, rows)
-    if upper > 0.0:
-        distance = upper
-        for c in range(3):
-            ws[AXIS, c] /= upper
-    else:
-        _, upper = depth(ints, floats, points, graph, a, b, ws, rows, big)
-        distance = -upper
-    for c in range(3):
-        ws[NEAR, c] -= ra * ws[AXIS, c]
-        ws[NEAR, 3 + c] += rb * ws[AXIS, c]
-    return distance - ra - rb

@@ -17,7 +17,7 @@ import numpy as np
 
 from ._jit import kernel
 from .gjk import AXIS, BEST, CLOUD, HALF_SPACE, KEEP, NEAR, REL, compose, gjk, support
-from .gjk_depth import signed_distance
+from .gjk_signed import signed_distance
 from .grid_search import STACK, field_gap
 
 WITHIN = 0.01
