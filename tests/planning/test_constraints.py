@@ -230,6 +230,7 @@ def test_what_no_path_can_keep_ends_in_time() -> None:
     late = plan(model, *ends, rng=np.random.default_rng(0), time_limit=0.2, constraints=[low])
     assert late.status is PlanStatus.TIME_SPENT
     assert "the tree from the start has" in late.explain()
+    assert "% left the constraints and" in late.explain()
     assert plan(model, *ends, rng=np.random.default_rng(0), time_limit=60.0).success
 
 

@@ -183,17 +183,17 @@ def _on_constraints(
     found = search.solve(rng, until)
     a, b = (int(count) for count in search.count)
     if found is None:
-        return _spent(search.full, began, search.samples, (a, b), task)
+        return _spent(search.full, began, search.samples, (a, b), task, f"; {search.told()}")
     path, root = found
     if simplify:
         path = search.shorten(path, rng, SHORTCUTS)
     return PlanResult(PlanStatus.SUCCESS, path, int(task.usable[root]), nodes=a + b, samples=search.samples)
 
 
-def _spent(full: bool, began: float, samples: int, nodes: tuple[int, int], task: _Task) -> PlanResult:
+def _spent(full: bool, began: float, samples: int, nodes: tuple[int, int], task: _Task, more: str = "") -> PlanResult:
     detail = (
         f"{time.perf_counter() - began:.2f} s and {samples} samples; the tree from the start has {nodes[0]} nodes, "
-        f"that from {len(task.usable)} free of {len(task.goals)} goals {nodes[1]}."
+        f"that from {len(task.usable)} free of {len(task.goals)} goals {nodes[1]}{more}."
     )
     status = PlanStatus.NODES_SPENT if full else PlanStatus.TIME_SPENT
     return PlanResult(status, detail=detail, nodes=sum(nodes), samples=samples)
