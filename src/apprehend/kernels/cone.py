@@ -13,7 +13,7 @@ A grasp has few rows (6 balance equations and the couplings of its limits), so a
 ``Â Âᵀ`` with the scaled matrix ``Â = A W`` (`kernels.cone_rows`). Directions are kept scaled too, u = W⁻¹ Δx and
 v = W Δz: there both are of the size of λ, and what a step leaves of ``A x = b`` is small to the last digits.
 
-Eight problems stand side by side in wide numbers; one that is finished makes room for the next at once. One problem
+Eight problems stand side by side on lanes (`kernels.vector`); one that is finished makes room for the next at once. One problem
 alone takes the same way with seven idle places: its steps are so short that a kernel of its own would not be faster.
 """
 
@@ -23,8 +23,8 @@ import numpy as np
 
 from ._jit import kernel
 from .cone_algebra import LAMBDA, apply, apply_rows, quadratic, quotient, room, scaling, triangular
-from .cone_rows import backward, factor, forward, gather, gram, spread
-from .wide import WIDTH, larger, load, load2, size, smaller, store, store2, where, wide
+from .cone_rows import WIDTH, backward, factor, forward, gather, gram, load, splat, spread
+from .vector import larger, magnitude, select, smaller, store
 
 OPTIMAL, INFEASIBLE, UNBOUNDED, INACCURATE, INVALID = 0, 1, 2, 3, 4
 BALANCE, COUPLING = -1, -2
@@ -104,31 +104,31 @@ def _measure(A, V_, R, K, degree):  # type: ignore[no-untyped-def]
     tau, kappa = load(K, TAU), load(K, KAPPA)
     spread(A, R, Y, V_, RD)
     gather(A, V_, X, R, RP)
-    mu, quad, cx, by = tau * kappa, wide(0.0), wide(0.0), wide(0.0)
-    ep, ed, proof, ray = wide(0.0), wide(0.0), wide(0.0), wide(0.0)
+    mu, quad, cx, by = tau * kappa, splat(0.0), splat(0.0), splat(0.0)
+    ep, ed, proof, ray = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
     for j in range(A.shape[0]):
-        x, z, c, ay = load2(V_, X, j), load2(V_, Z, j), load2(V_, C, j), load2(V_, RD, j)
-        qx = load2(V_, SQUARE, j) * x
+        x, z, c, ay = load(V_, X, j), load(V_, Z, j), load(V_, C, j), load(V_, RD, j)
+        qx = load(V_, SQUARE, j) * x
         t = qx + c * tau - z - ay
-        store2(V_, RD, j, t)
-        ed = larger(size(t), ed)
-        proof = larger(size(z + ay), proof)
-        ray = larger(size(qx), ray)
+        store(V_, RD, j, t)
+        ed = larger(magnitude(t), ed)
+        proof = larger(magnitude(z + ay), proof)
+        ray = larger(magnitude(qx), ray)
         mu += x * z
         cx += c * x
         quad += qx * x
     for r in range(A.shape[1]):
-        ax, b = load2(R, RP, r), load2(R, B, r)
+        ax, b = load(R, RP, r), load(R, B, r)
         t = ax - b * tau
-        store2(R, RP, r, t)
-        ep = larger(size(t), ep)
-        ray = larger(size(ax), ray)
-        by += b * load2(R, Y, r)
+        store(R, RP, r, t)
+        ep = larger(magnitude(t), ep)
+        ray = larger(magnitude(ax), ray)
+        by += b * load(R, Y, r)
     share = 1.0 / tau
     mu *= 1.0 / degree
     half = 0.5 * quad * share
     primal, dual = (cx + half) * share, (by - half) * share
-    gap = size(primal - dual) / larger(0.01, smaller(size(primal), size(dual)))
+    gap = magnitude(primal - dual) / larger(0.01, smaller(magnitude(primal), magnitude(dual)))
     ep, ed = ep * share / (1.0 + load(K, NORM_B)), ed * share / (1.0 + load(K, NORM_C))
     store(K, PRIMAL, primal)
     store(K, DUAL, dual)
@@ -150,16 +150,16 @@ def _keep(V_, R, K, best):  # type: ignore[no-untyped-def]
     n, rows = V_.shape[1], R.shape[1]
     worst, least, since = load(K, WORST), load(K, LEAST), load(K, SINCE)
     better = worst < least
-    store(K, SINCE, where(better, where(worst > 0.5 * least, since - 1.0, 0.0), since))
-    store(K, LEAST, where(better, worst, least))
+    store(K, SINCE, select(better, select(worst > 0.5 * least, since - 1.0, 0.0), since))
+    store(K, LEAST, select(better, worst, least))
     share = 1.0 / load(K, TAU)
     for j in range(n):
-        store(best, j, where(better, load2(V_, X, j) * share, load(best, j)))
-        store(best, n + rows + j, where(better, load2(V_, Z, j) * share, load(best, n + rows + j)))
+        store(best, j, select(better, load(V_, X, j) * share, load(best, j)))
+        store(best, n + rows + j, select(better, load(V_, Z, j) * share, load(best, n + rows + j)))
     for r in range(rows):
-        store(best, n + r, where(better, load2(R, Y, r) * share, load(best, n + r)))
+        store(best, n + r, select(better, load(R, Y, r) * share, load(best, n + r)))
     for r in range(4):
-        store(K, KEPT + r, where(better, load(K, PRIMAL + r), load(K, KEPT + r)))
+        store(K, KEPT + r, select(better, load(K, PRIMAL + r), load(K, KEPT + r)))
 
 
 @kernel(borrow=True)
@@ -218,20 +218,20 @@ def _direction(phase, rest, A, L, S, V_, R, cones):  # type: ignore[no-untyped-d
         triangular(V_, cones, L, D, False)
     gather(A, V_, D, R, DY)
     for r in range(A.shape[1]):
-        right = load2(R, B, r) if phase == 0 else -(rest * load2(R, RP, r))
-        store2(R, DY, r, load2(R, DY, r) + right)
+        right = load(R, B, r) if phase == 0 else -(rest * load(R, RP, r))
+        store(R, DY, r, load(R, DY, r) + right)
     forward(S, 0, A.shape[1], R, DY)
     backward(S, 0, A.shape[1], R, DY)
     spread(A, R, DY, V_, U)
     for j in range(A.shape[0]):
-        store2(V_, U, j, load2(V_, U, j) - load2(V_, D, j))
+        store(V_, U, j, load(V_, U, j) - load(V_, D, j))
     if L.shape[0] > 0:
         triangular(V_, cones, L, U, True)
-    t = wide(0.0)
+    t = splat(0.0)
     for j in range(A.shape[0]):
-        t += (load2(V_, CH, j) + load2(V_, QH, j)) * load2(V_, U, j)
+        t += (load(V_, CH, j) + load(V_, QH, j)) * load(V_, U, j)
     for r in range(A.shape[1]):
-        t -= load2(R, B, r) * load2(R, DY, r)
+        t -= load(R, B, r) * load(R, DY, r)
     return t
 
 
@@ -243,10 +243,10 @@ def _prepare(A, Ah, S, W, L, V_, R, cones, share):  # type: ignore[no-untyped-de
     apply(V_, cones, 1.0, C, CH)
     apply(V_, cones, 1.0, RD, RH)
     for j in range(A.shape[0]):
-        store2(V_, QH, j, wide(0.0))
+        store(V_, QH, j, splat(0.0))
     if L.shape[0] > 0:
         for j in range(A.shape[0]):
-            store2(V_, E, j, 2.0 * load2(V_, SQUARE, j) * load2(V_, X, j) * share)
+            store(V_, E, j, 2.0 * load(V_, SQUARE, j) * load(V_, X, j) * share)
         apply(V_, cones, 1.0, E, QH)
         quadratic(V_, cones, SQUARE, W, L, Ah)
     gram(Ah, S)
@@ -260,8 +260,8 @@ def _advance(A, Ah, S, W, L, V_, R, K, cones):  # type: ignore[no-untyped-def]
     tau, kappa, mu, rg, quad = load(K, TAU), load(K, KAPPA), load(K, MU), load(K, RG), load(K, QUAD)
     share = 1.0 / tau
     _prepare(A, Ah, S, W, L, V_, R, cones, share)
-    sigma, dtau, dkappa, alpha = wide(0.0), wide(0.0), wide(0.0), wide(0.0)
-    den, dk = wide(1.0), kappa * tau
+    sigma, dtau, dkappa, alpha = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+    den, dk = splat(1.0), kappa * tau
     for phase in range(3):
         rest = 1.0 - sigma
         if phase == 2:
@@ -269,33 +269,33 @@ def _advance(A, Ah, S, W, L, V_, R, K, cones):  # type: ignore[no-untyped-def]
             dk = kappa * tau + dtau * dkappa - sigma * mu
         for j in range(n):
             if phase == 0:
-                store2(V_, D, j, load2(V_, CH, j))
+                store(V_, D, j, load(V_, CH, j))
             else:
-                t = load2(V_, LAMBDA, j) if phase == 1 else load2(V_, LAMBDA, j) + load2(V_, E, j)
-                store2(V_, V, j, t)
-                store2(V_, D, j, t + rest * load2(V_, RH, j))
+                t = load(V_, LAMBDA, j) if phase == 1 else load(V_, LAMBDA, j) + load(V_, E, j)
+                store(V_, V, j, t)
+                store(V_, D, j, t + rest * load(V_, RH, j))
         t = _direction(phase, rest, Ah, L, S, V_, R, cones)
         if phase == 0:
             den = t - kappa * share - quad * share * share
             for j in range(n):
-                store2(V_, U0, j, load2(V_, U, j))
+                store(V_, U0, j, load(V_, U, j))
             for r in range(rows):
-                store2(R, Y0, r, load2(R, DY, r))
+                store(R, Y0, r, load(R, DY, r))
             continue
         dtau = (dk * share - rest * rg - t) / den
         dkappa = -(dk + kappa * dtau) * share
         for j in range(n):
-            t = load2(V_, U, j) + dtau * load2(V_, U0, j)
-            store2(V_, U, j, t)
-            store2(V_, V, j, -load2(V_, V, j) - t)
+            t = load(V_, U, j) + dtau * load(V_, U0, j)
+            store(V_, U, j, t)
+            store(V_, V, j, -load(V_, V, j) - t)
         for r in range(rows):
-            store2(R, DY, r, load2(R, DY, r) + dtau * load2(R, Y0, r))
+            store(R, DY, r, load(R, DY, r) + dtau * load(R, Y0, r))
         if L.shape[0] > 0:  # where W stretches Q, the dual equation gives more digits of Δz than complementarity
             apply(V_, cones, 1.0, U, D)
             spread(A, R, DY, V_, E)
             for j in range(n):
-                t = load2(V_, SQUARE, j) * load2(V_, D, j) + load2(V_, C, j) * dtau + rest * load2(V_, RD, j)
-                store2(V_, E, j, t - load2(V_, E, j))
+                t = load(V_, SQUARE, j) * load(V_, D, j) + load(V_, C, j) * dtau + rest * load(V_, RD, j)
+                store(V_, E, j, t - load(V_, E, j))
             apply(V_, cones, 1.0, E, V)
         need = larger(larger(room(V_, cones, U, V), -dtau * share), larger(-dkappa / kappa, 1e-30))
         alpha = 1.0 / need
@@ -314,18 +314,18 @@ def _move(alpha, tau, kappa, V_, R, K):  # type: ignore[no-untyped-def]
     """Go a step where it leads on, and keep numbers near one: the embedding is homogeneous."""
     good = alpha > 1e-9
     t = larger(tau, kappa)
-    scale = where(t < 1e-3, 1.0 / t, where(t > 1e3, 1.0 / t, 1.0))
-    store(K, TAU, where(good, scale * tau, load(K, TAU)))
-    store(K, KAPPA, where(good, scale * kappa, load(K, KAPPA)))
-    store(K, SINCE, where(good, load(K, SINCE) + 1.0, 99.0))
+    scale = select(t < 1e-3, 1.0 / t, select(t > 1e3, 1.0 / t, 1.0))
+    store(K, TAU, select(good, scale * tau, load(K, TAU)))
+    store(K, KAPPA, select(good, scale * kappa, load(K, KAPPA)))
+    store(K, SINCE, select(good, load(K, SINCE) + 1.0, 99.0))
     store(K, STEPS, load(K, STEPS) + 1.0)
     for j in range(V_.shape[1]):
-        a, b = load2(V_, X, j), load2(V_, Z, j)
-        store2(V_, X, j, where(good, scale * (a + alpha * load2(V_, D, j)), a))
-        store2(V_, Z, j, where(good, scale * (b + alpha * load2(V_, E, j)), b))
+        a, b = load(V_, X, j), load(V_, Z, j)
+        store(V_, X, j, select(good, scale * (a + alpha * load(V_, D, j)), a))
+        store(V_, Z, j, select(good, scale * (b + alpha * load(V_, E, j)), b))
     for r in range(R.shape[1]):
-        a = load2(R, Y, r)
-        store2(R, Y, r, where(good, scale * (a + alpha * load2(R, DY, r)), a))
+        a = load(R, Y, r)
+        store(R, Y, r, select(good, scale * (a + alpha * load(R, DY, r)), a))
 
 
 @kernel(borrow=True)

@@ -1,4 +1,4 @@
-"""The linear algebra of a cone program in wide numbers: products with the constraint matrix, and its normal equations.
+"""The linear algebra of a cone program on lanes: products with the constraint matrix, and its normal equations.
 
 The matrix is kept by columns ``(n, rows, WIDTH)``. Rows go in threes, so that sums stay in registers: their number is a
 multiple of three, filled up with rows of zeros, which `factor` leaves out.
@@ -7,33 +7,37 @@ multiple of three, filled up with rows of zeros, which `factor` leaves out.
 from __future__ import annotations
 
 from ._jit import kernel
-from .wide import load2, root, store2, where, wide
+from .vector import of_width, root, select, store
+
+WIDTH = 8
+"""Problems side by side."""
+load, splat = of_width(WIDTH)
 
 
 @kernel(borrow=True)
 def spread(A, rows, y, columns, out):  # type: ignore[no-untyped-def]
     """``columns[out] = Aᵀ rows[y]``, one entry for each column."""
     for r in range(0, A.shape[1], 3):
-        y0, y1, y2 = load2(rows, y, r), load2(rows, y, r + 1), load2(rows, y, r + 2)
+        y0, y1, y2 = load(rows, y, r), load(rows, y, r + 1), load(rows, y, r + 2)
         for j in range(A.shape[0]):
-            before = wide(0.0) if r == 0 else load2(columns, out, j)
-            t = load2(A, j, r) * y0 + load2(A, j, r + 1) * y1 + load2(A, j, r + 2) * y2
-            store2(columns, out, j, before + t)
+            before = splat(0.0) if r == 0 else load(columns, out, j)
+            t = load(A, j, r) * y0 + load(A, j, r + 1) * y1 + load(A, j, r + 2) * y2
+            store(columns, out, j, before + t)
 
 
 @kernel(borrow=True)
 def gather(A, columns, x, rows, out):  # type: ignore[no-untyped-def]
     """``rows[out] = A columns[x]``, one entry for each row."""
     for r in range(0, A.shape[1], 3):
-        t0, t1, t2 = wide(0.0), wide(0.0), wide(0.0)
+        t0, t1, t2 = splat(0.0), splat(0.0), splat(0.0)
         for j in range(A.shape[0]):
-            v = load2(columns, x, j)
-            t0 += load2(A, j, r) * v
-            t1 += load2(A, j, r + 1) * v
-            t2 += load2(A, j, r + 2) * v
-        store2(rows, out, r, t0)
-        store2(rows, out, r + 1, t1)
-        store2(rows, out, r + 2, t2)
+            v = load(columns, x, j)
+            t0 += load(A, j, r) * v
+            t1 += load(A, j, r + 1) * v
+            t2 += load(A, j, r + 2) * v
+        store(rows, out, r, t0)
+        store(rows, out, r + 1, t1)
+        store(rows, out, r + 2, t2)
 
 
 @kernel(inline=True)
@@ -42,12 +46,12 @@ def gram(A, S):  # type: ignore[no-untyped-def]
     n, rows = A.shape[0], A.shape[1]
     for r in range(0, rows, 3):
         for q in range(0, r + 1, 3):
-            s00, s01, s02 = wide(0.0), wide(0.0), wide(0.0)
-            s10, s11, s12 = wide(0.0), wide(0.0), wide(0.0)
-            s20, s21, s22 = wide(0.0), wide(0.0), wide(0.0)
+            s00, s01, s02 = splat(0.0), splat(0.0), splat(0.0)
+            s10, s11, s12 = splat(0.0), splat(0.0), splat(0.0)
+            s20, s21, s22 = splat(0.0), splat(0.0), splat(0.0)
             for j in range(n):
-                a0, a1, a2 = load2(A, j, r), load2(A, j, r + 1), load2(A, j, r + 2)
-                b0, b1, b2 = load2(A, j, q), load2(A, j, q + 1), load2(A, j, q + 2)
+                a0, a1, a2 = load(A, j, r), load(A, j, r + 1), load(A, j, r + 2)
+                b0, b1, b2 = load(A, j, q), load(A, j, q + 1), load(A, j, q + 2)
                 s00 += a0 * b0
                 s01 += a0 * b1
                 s02 += a0 * b2
@@ -57,15 +61,15 @@ def gram(A, S):  # type: ignore[no-untyped-def]
                 s20 += a2 * b0
                 s21 += a2 * b1
                 s22 += a2 * b2
-            store2(S, r, q, s00)
-            store2(S, r, q + 1, s01)
-            store2(S, r, q + 2, s02)
-            store2(S, r + 1, q, s10)
-            store2(S, r + 1, q + 1, s11)
-            store2(S, r + 1, q + 2, s12)
-            store2(S, r + 2, q, s20)
-            store2(S, r + 2, q + 1, s21)
-            store2(S, r + 2, q + 2, s22)
+            store(S, r, q, s00)
+            store(S, r, q + 1, s01)
+            store(S, r, q + 2, s02)
+            store(S, r + 1, q, s10)
+            store(S, r + 1, q + 1, s11)
+            store(S, r + 1, q + 2, s12)
+            store(S, r + 2, q, s20)
+            store(S, r + 2, q + 1, s21)
+            store(S, r + 2, q + 2, s22)
 
 
 @kernel(borrow=True)
@@ -75,28 +79,28 @@ def factor(S, at, n):  # type: ignore[no-untyped-def]
     A pivot lost to rounding is left out.
     """
     for j in range(n):
-        before = load2(S, at + j, j)
+        before = load(S, at + j, j)
         t = before
         for m in range(j):
-            a = load2(S, at + j, m)
+            a = load(S, at + j, m)
             t -= a * a
-        inverse = where(t > 1e-15 * before, 1.0 / root(t), 0.0)
-        store2(S, at + j, j, inverse)
+        inverse = select(t > 1e-15 * before, 1.0 / root(t), 0.0)
+        store(S, at + j, j, inverse)
         for i in range(j + 1, n):
-            t = load2(S, at + i, j)
+            t = load(S, at + i, j)
             for m in range(j):
-                t -= load2(S, at + i, m) * load2(S, at + j, m)
-            store2(S, at + i, j, t * inverse)
+                t -= load(S, at + i, m) * load(S, at + j, m)
+            store(S, at + i, j, t * inverse)
 
 
 @kernel(borrow=True)
 def forward(S, at, n, v, k):  # type: ignore[no-untyped-def]
     """``L⁻¹ v[k]`` in place, for the n entries from *at* on."""
     for j in range(n):
-        t = load2(v, k, at + j)
+        t = load(v, k, at + j)
         for m in range(j):
-            t -= load2(S, at + j, m) * load2(v, k, at + m)
-        store2(v, k, at + j, t * load2(S, at + j, j))
+            t -= load(S, at + j, m) * load(v, k, at + m)
+        store(v, k, at + j, t * load(S, at + j, j))
 
 
 @kernel(borrow=True)
@@ -104,7 +108,7 @@ def backward(S, at, n, v, k):  # type: ignore[no-untyped-def]
     """``L⁻ᵀ v[k]`` in place, for the n entries from *at* on."""
     for back in range(n):
         j = n - 1 - back
-        t = load2(v, k, at + j)
+        t = load(v, k, at + j)
         for m in range(j + 1, n):
-            t -= load2(S, at + m, j) * load2(v, k, at + m)
-        store2(v, k, at + j, t * load2(S, at + j, j))
+            t -= load(S, at + m, j) * load(v, k, at + m)
+        store(v, k, at + j, t * load(S, at + j, j))

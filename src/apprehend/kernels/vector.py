@@ -1,292 +1,241 @@
-"""Lanes as values: the numbers of all lanes at one place, in vector registers, with the usual operators.
+"""Lanes as values: numbers of several problems side by side, that kernels compute with as if they were one number.
 
-A loop over lanes becomes vector instructions only if the compiler can prove that its arrays do not overlap, which it
-often cannot. Inside kernels, ``load(a, i)`` reads the lanes ``a[i], …, a[i + LANES − 1]`` of a float64 array as one
-value of the type `Lanes`; ``store`` writes one. In between ``+ − * /``, comparisons (which give a `Mask`), ``&``,
-``|`` and `select` work on all lanes at once, with numbers on either side. Indices are not checked.
+LLVM's loop vectoriser needs long loops over lanes and a proof that their arrays don't overlap (or checks of it at run
+time), and keeps every intermediate in memory. Here the lanes are a type instead, ``<n x double>`` in LLVM, with the usual
+operators, so that sums stay in registers; eight of them are one AVX-512 register, two of AVX, four of NEON.
+
+The width is part of the type. `of_width` makes the two functions that need it said: one reads from an array, one
+spreads a number; those of this file are `LANES` wide. All others take it from their arguments: ``+ − * /`` and
+comparisons (which give a `Mask`) with numbers on either side, ``& | ~`` of masks, and the functions below.
 """
 
 from __future__ import annotations
 
 import operator
+from collections.abc import Callable
+from typing import Any
 
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic, models, overload, register_model
+from numba.core import cgutils, types
+from numba.core.imputils import lower_builtin
+from numba.core.typing import signature
+from numba.core.typing.templates import AbstractTemplate, infer_global
+from numba.extending import intrinsic, models, register_model
 
 from .lanes import LANES
 
-DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
-BITS = ir.VectorType(ir.IntType(1), LANES)
+ir = cgutils.ir
 
 
-class Lanes(types.Type):
-    """One number on every lane."""
+class Places(types.Type):
+    """Numba's type of *width* entries side by side."""
 
-    def __init__(self):
-        super().__init__(name="Lanes")
+    entry: Any
 
-
-class Mask(types.Type):
-    """One truth value on every lane."""
-
-    def __init__(self):
-        super().__init__(name="Mask")
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"{type(self).__name__}{width}")
 
 
-lanes_type, mask_type = Lanes(), Mask()
+class Lanes(Places):
+    """Float64."""
+
+    entry = ir.DoubleType()
+
+
+class Mask(Places):
+    """Truth values."""
+
+    entry = ir.IntType(1)
 
 
 @register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager, fe_type):
-        super().__init__(manager, fe_type, DOUBLES)
-
-
 @register_model(Mask)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, manager, fe_type):
-        super().__init__(manager, fe_type, BITS)
+class _Model(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Places) -> None:
+        super().__init__(manager, kind, ir.VectorType(kind.entry, kind.width))
 
 
-def _is_array(a):
-    return isinstance(a, types.Array) and a.dtype == types.float64 and a.ndim == 1
-
-
-def _pointer(context, builder, array_type, array, index):
-    data = context.make_array(array_type)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [index]), DOUBLES.as_pointer())
-
-
-@intrinsic
-def _load(typingctx, a, i):
-    def generate(context, builder, signature, args):
-        index = context.cast(builder, args[1], signature.args[1], types.intp)
-        value = builder.load(_pointer(context, builder, signature.args[0], args[0], index))
-        value.align = 8
+def _splat(builder: Any, width: int, value: Any) -> Any:
+    """A float, or what is a vector already, as a vector."""
+    if isinstance(value.type, ir.VectorType):
         return value
+    nothing = ir.Constant(ir.VectorType(value.type, width), ir.Undefined)
+    first = builder.insert_element(nothing, value, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width))
 
-    return lanes_type(a, i), generate
+
+def _of_two(function: Any, result: type[Places], of: type[Places], make: Callable[[Any, Any, Any], Any]) -> None:
+    """Give *function* a meaning for two values of the kind *of*; a number may stand for one that is `Lanes`."""
+
+    @infer_global(function)
+    class _Typing(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            found = [kind for kind in args if type(kind) is of]
+            if len(args) != 2 or not found:
+                return None
+            same = all(kind == found[0] or (of is Lanes and isinstance(kind, types.Number)) for kind in args)
+            kinds = [kind if kind == found[0] else types.float64 for kind in args]
+            return signature(result(found[0].width), *kinds) if same else None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return make(builder, *(_splat(builder, sig.return_type.width, value) for value in args))
+
+    for kinds in ((of, of),) if of is Mask else ((of, of), (of, types.Float), (types.Float, of)):
+        lower_builtin(function, *kinds)(lower)
+
+
+def _of_one(function: Any, of: type[Places], make: Callable[[Any, Any], Any]) -> None:
+    """Give *function* a meaning for one value of the kind *of*."""
+
+    @infer_global(function)
+    class _Typing(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            return signature(args[0], args[0]) if type(args[0]) is of else None
+
+    @lower_builtin(function, of)
+    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return make(builder, args[0])
+
+
+def larger(a: Any, b: Any) -> Any:
+    """The larger of two, lane by lane; b where one of them is NaN."""
+    raise NotImplementedError
+
+
+def smaller(a: Any, b: Any) -> Any:
+    """The smaller of two, lane by lane; b where one of them is NaN."""
+    raise NotImplementedError
+
+
+def root(a: Any) -> Any:
+    """√a."""
+    raise NotImplementedError
+
+
+def magnitude(a: Any) -> Any:
+    """|a|."""
+    raise NotImplementedError
+
+
+def floor(a: Any) -> Any:
+    """The largest whole number that is not larger, lane by lane."""
+    raise NotImplementedError
+
+
+def _choice(sign: str) -> Callable[[Any, Any, Any], Any]:
+    return lambda builder, a, b: builder.select(builder.fcmp_ordered(sign, a, b), a, b)
+
+
+def _function(name: str) -> Callable[[Any, Any], Any]:
+    """LLVM's own function of that name."""
+
+    def make(builder: Any, a: Any) -> Any:
+        kind = ir.FunctionType(a.type, [a.type])
+        return builder.call(
+            cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{a.type.count}f64"), [a]
+        )
+
+    return make
+
+
+for _name, _make in (("add", "fadd"), ("sub", "fsub"), ("mul", "fmul"), ("truediv", "fdiv")):
+    for _operator in (getattr(operator, _name), getattr(operator, f"i{_name}")):
+        _of_two(_operator, Lanes, Lanes, lambda builder, a, b, make=_make: getattr(builder, make)(a, b))
+for _name, _sign in (("lt", "<"), ("le", "<="), ("gt", ">"), ("ge", ">="), ("eq", "==")):
+    _of_two(getattr(operator, _name), Mask, Lanes, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
+_of_two(operator.ne, Mask, Lanes, lambda builder, a, b: builder.fcmp_unordered("!=", a, b))
+_of_two(operator.and_, Mask, Mask, lambda builder, a, b: builder.and_(a, b))
+_of_two(operator.or_, Mask, Mask, lambda builder, a, b: builder.or_(a, b))
+_of_two(larger, Lanes, Lanes, _choice(">"))
+_of_two(smaller, Lanes, Lanes, _choice("<"))
+_of_one(operator.neg, Lanes, lambda builder, a: builder.fneg(a))
+_of_one(operator.invert, Mask, lambda builder, a: builder.not_(a))
+_of_one(root, Lanes, _function("sqrt"))
+_of_one(magnitude, Lanes, _function("fabs"))
+_of_one(floor, Lanes, _function("floor"))
 
 
 @intrinsic
-def _store(typingctx, a, i, v):
-    def generate(context, builder, signature, args):
-        index = context.cast(builder, args[1], signature.args[1], types.intp)
-        done = builder.store(args[2], _pointer(context, builder, signature.args[0], args[0], index))
-        done.align = 8
+def select(typing: Any, mask: Any, a: Any, b: Any) -> Any:
+    """a on the lanes of the mask, b elsewhere."""
+
+    def make(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.select(args[0], *(_splat(builder, mask.width, value) for value in args[1:]))
+
+    kinds = [kind if isinstance(kind, Lanes) else types.float64 for kind in (a, b)]
+    return Lanes(mask.width)(mask, *kinds), make
+
+
+@intrinsic
+def some(typing: Any, mask: Any) -> Any:
+    """Whether the mask is true on any lane."""
+
+    def make(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        bits = ir.IntType(mask.width)
+        return builder.icmp_unsigned("!=", builder.bitcast(args[0], bits), ir.Constant(bits, 0))
+
+    return types.boolean(mask), make
+
+
+def _indexed(result: Any, a: Any, index: Any, *behind: Any) -> Any:
+    """The signature of a function of an array, the indices of a place in it, and what comes behind them."""
+    if not (isinstance(a, types.Array) and a.dtype == types.float64 and a.layout == "C"):
+        return None
+    rest = types.StarArgTuple.from_types((types.intp,) * len(index) + behind)
+    return result(a, rest) if len(index) in (a.ndim - 1, a.ndim) else None
+
+
+def _place(context: Any, builder: Any, width: int, kind: Any, value: Any, index: Any) -> Any:
+    """Where the lanes with that index stand in an array."""
+    array = context.make_array(kind)(context, builder, value)
+    shape = cgutils.unpack_tuple(builder, array.shape, kind.ndim)
+    offset = index[0]
+    for d in range(1, len(index)):
+        offset = builder.add(builder.mul(offset, shape[d]), index[d])
+    if len(index) < kind.ndim:  # the last axis is not named: it is as long as the lanes
+        offset = builder.mul(offset, ir.Constant(offset.type, width))
+    return builder.bitcast(builder.gep(array.data, [offset]), ir.VectorType(Lanes.entry, width).as_pointer())
+
+
+@intrinsic
+def store(typing: Any, a: Any, *place: Any) -> Any:
+    """``store(a, i, …, value)``: write lanes where ``load(a, i, …)`` reads them."""
+    *index, kind = place
+
+    def make(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        *index, value = cgutils.unpack_tuple(builder, args[1])
+        builder.store(value, _place(context, builder, kind.width, a, args[0], index), align=8)
         return context.get_dummy_value()
 
-    return types.void(a, i, v), generate
+    sig = _indexed(types.void, a, index, kind)
+    return (sig, make) if sig else None
 
 
-@intrinsic
-def _splat(typingctx, x):
-    def generate(context, builder, signature, args):
-        value = context.cast(builder, args[0], signature.args[0], types.float64)
-        one = builder.insert_element(ir.Constant(DOUBLES, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
-        zeros = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-        return builder.shuffle_vector(one, ir.Constant(DOUBLES, ir.Undefined), zeros)
-
-    return lanes_type(x), generate
-
-
-def load(a, i):
-    """The lanes ``a[i], …, a[i + LANES − 1]``."""
-    raise NotImplementedError
-
-
-def store(a, i, v):
-    """Write *v* to ``a[i], …, a[i + LANES − 1]``."""
-    raise NotImplementedError
-
-
-def splat(x):
-    """The number *x* on every lane."""
-    raise NotImplementedError
-
-
-def select(mask, a, b):
-    """*a* where *mask* is true, else *b*."""
-    raise NotImplementedError
-
-
-def larger(a, b):
-    """The larger of two on every lane; *b* where either is not a number."""
-    raise NotImplementedError
-
-
-def smaller(a, b):
-    """The smaller of two on every lane; *b* where either is not a number."""
-    raise NotImplementedError
-
-
-def root(a):
-    """Square roots."""
-    raise NotImplementedError
-
-
-def magnitude(a):
-    """Absolute values."""
-    raise NotImplementedError
-
-
-def floor(a):
-    """The largest whole numbers that are not larger."""
-    raise NotImplementedError
-
-
-def some(mask):
-    """Whether *mask* is true on any lane."""
-    raise NotImplementedError
-
-
-@overload(load, inline="always")
-def _(a, i):
-    if _is_array(a):
-        return lambda a, i: _load(a, i)
-    return None
-
-
-@overload(store, inline="always")
-def _(a, i, v):
-    if _is_array(a):
-        return lambda a, i, v: _store(a, i, v)
-    return None
-
-
-@overload(splat, inline="always")
-def _(x):
-    return lambda x: _splat(x)
-
-
-def _binary(build, result):
-    """An intrinsic on two lanes."""
+def of_width(width: int) -> tuple[Any, Any]:
+    """``load(a, i, …)`` and ``splat(x)`` for that many lanes."""
 
     @intrinsic
-    def of_two(typingctx, a, b):
-        return result(a, b), lambda context, builder, signature, args: build(builder, *args)
+    def load(typing: Any, a: Any, *index: Any) -> Any:
+        """The lanes from ``a[i, …]`` on; without the last index, that row. Indices are not checked."""
 
-    return of_two
+        def make(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            value = builder.load(_place(context, builder, width, a, args[0], cgutils.unpack_tuple(builder, args[1])))
+            value.align = 8
+            return value
 
+        sig = _indexed(Lanes(width), a, index)
+        return (sig, make) if sig else None
 
-def _operators(function, build, result, operand):
-    of_two = _binary(build, result)
-
-    @overload(function, inline="always")
-    def _(a, b):
-        left, right = isinstance(a, operand), isinstance(b, operand)
-        if left and right:
-            return lambda a, b: of_two(a, b)
-        if operand is Lanes and left and isinstance(b, types.Number):
-            return lambda a, b: of_two(a, _splat(b))
-        if operand is Lanes and right and isinstance(a, types.Number):
-            return lambda a, b: of_two(_splat(a), b)
-        return None
-
-
-def _larger(builder, a, b):
-    return builder.select(builder.fcmp_ordered(">", a, b), a, b)
-
-
-def _smaller(builder, a, b):
-    return builder.select(builder.fcmp_ordered("<", a, b), a, b)
-
-
-_operators(operator.add, lambda builder, a, b: builder.fadd(a, b), lanes_type, Lanes)
-_operators(operator.sub, lambda builder, a, b: builder.fsub(a, b), lanes_type, Lanes)
-_operators(operator.mul, lambda builder, a, b: builder.fmul(a, b), lanes_type, Lanes)
-_operators(operator.truediv, lambda builder, a, b: builder.fdiv(a, b), lanes_type, Lanes)
-_operators(operator.lt, lambda builder, a, b: builder.fcmp_ordered("<", a, b), mask_type, Lanes)
-_operators(operator.le, lambda builder, a, b: builder.fcmp_ordered("<=", a, b), mask_type, Lanes)
-_operators(operator.gt, lambda builder, a, b: builder.fcmp_ordered(">", a, b), mask_type, Lanes)
-_operators(operator.ge, lambda builder, a, b: builder.fcmp_ordered(">=", a, b), mask_type, Lanes)
-_operators(operator.eq, lambda builder, a, b: builder.fcmp_ordered("==", a, b), mask_type, Lanes)
-_operators(operator.ne, lambda builder, a, b: builder.fcmp_unordered("!=", a, b), mask_type, Lanes)
-_operators(operator.and_, lambda builder, a, b: builder.and_(a, b), mask_type, Mask)
-_operators(operator.or_, lambda builder, a, b: builder.or_(a, b), mask_type, Mask)
-_operators(larger, _larger, lanes_type, Lanes)
-_operators(smaller, _smaller, lanes_type, Lanes)
-
-
-@intrinsic
-def _not(typingctx, a):
-    return mask_type(a), lambda context, builder, signature, args: builder.not_(args[0])
-
-
-@intrinsic
-def _select(typingctx, mask, a, b):
-    return lanes_type(mask, a, b), lambda context, builder, signature, args: builder.select(*args)
-
-
-@intrinsic
-def _some(typingctx, mask):
-    def generate(context, builder, signature, args):
-        bits = builder.bitcast(args[0], ir.IntType(LANES))
-        return builder.icmp_unsigned("!=", bits, ir.Constant(ir.IntType(LANES), 0))
-
-    return types.boolean(mask), generate
-
-
-def _unary(name):
     @intrinsic
-    def of_one(typingctx, a):
-        def generate(context, builder, signature, args):
-            kind = ir.FunctionType(DOUBLES, [DOUBLES])
-            return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f64"), args)
+    def splat(typing: Any, x: Any) -> Any:
+        """The number *x* on every lane."""
 
-        return lanes_type(a), generate
+        def make(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return _splat(builder, width, args[0])
 
-    return of_one
+        return Lanes(width)(types.float64), make
 
-
-_sqrt, _fabs, _floor = _unary("sqrt"), _unary("fabs"), _unary("floor")
+    return load, splat
 
 
-@overload(operator.invert, inline="always")
-def _(a):
-    if isinstance(a, Mask):
-        return lambda a: _not(a)
-    return None
-
-
-@overload(operator.neg, inline="always")
-def _(a):
-    if isinstance(a, Lanes):
-        return lambda a: _splat(0.0) - a
-    return None
-
-
-@overload(select, inline="always")
-def _(mask, a, b):
-    left, right = isinstance(a, Lanes), isinstance(b, Lanes)
-    if not isinstance(mask, Mask):
-        return None
-    if left and right:
-        return lambda mask, a, b: _select(mask, a, b)
-    if left:
-        return lambda mask, a, b: _select(mask, a, _splat(b))
-    if right:
-        return lambda mask, a, b: _select(mask, _splat(a), b)
-    return lambda mask, a, b: _select(mask, _splat(a), _splat(b))
-
-
-@overload(some, inline="always")
-def _(mask):
-    return lambda mask: _some(mask)
-
-
-@overload(root, inline="always")
-def _(a):
-    return lambda a: _sqrt(a)
-
-
-@overload(magnitude, inline="always")
-def _(a):
-    return lambda a: _fabs(a)
-
-
-@overload(floor, inline="always")
-def _(a):
-    return lambda a: _floor(a)
+load, splat = of_width(LANES)
