@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from apprehend.collision import Box, CollisionModel, Convex, RobotSource, Scene, find_allowed_pairs
+from apprehend.collision.allowed import sampled
 from apprehend.errors import DescriptionError, InputError
-from apprehend.robots import parse_srdf
+from apprehend.kinematics import Robot
+from apprehend.robots import Description, Joint, JointLimits, JointType, Link, Shape, ShapeKind, parse_srdf
 from tests.collision.makers import gantry, planar, pose
 
 
@@ -112,3 +114,39 @@ def test_distances_of_every_pair_with_gradients() -> None:
     assert {frozenset((touch.a, touch.b)) for touch in touching} == names
     with pytest.raises(InputError, match="within is NaN"):
         model.distances(q, within=float("nan"))
+
+
+def test_what_hangs_on_a_link_without_geometry_is_checked_unless_it_is_near() -> None:
+    """A table and a socket fixed to an empty root: the first link turns in the socket, and may hit the table."""
+
+    def link(name: str, *size: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Link:
+        return Link(name, collisions=(Shape(ShapeKind.BOX, size, pose(*at)),) if size else ())
+
+    links = [link("root"), link("socket", 0.1, 0.1, 0.1), link("table", 0.2, 0.2, 0.1), link("arm", 0.5, 0.05, 0.05)]
+    limits = JointLimits(-3.0, 3.0, 1.0)
+    joints = (
+        Joint("mount", JointType.FIXED, "root", "socket", np.eye(4)),
+        Joint("stand", JointType.FIXED, "root", "table", pose(0.3)),
+        Joint("turn", JointType.REVOLUTE, "root", "arm", np.eye(4), np.array([0.0, 0.0, 1.0]), limits),
+    )
+    links[3] = link("arm", 0.5, 0.05, 0.05, at=(0.25, 0.0, 0.0))
+    robot = Robot(Description("turner", "root", {link.name: link for link in links}, joints))
+    model = CollisionModel(robot)
+    assert model.reasons == {pair("arm", "socket"): "connected by a joint"}
+    assert model.free([1.5])
+    assert [(t.a, t.b) for t in model.why([0.0])] == [("arm", "table")]
+
+
+def test_joints_are_sampled_within_their_limits() -> None:
+    """A slide that is nowhere within π m of its zero, and a joint that turns on and on."""
+    axis, limits = np.array([1.0, 0.0, 0.0]), JointLimits(4.0, 6.0, 1.0)
+    ball = (Shape(ShapeKind.SPHERE, (0.1,), np.eye(4)),)
+    names = ["base", "cart", "wheel"]
+    joints = (
+        Joint("slide", JointType.PRISMATIC, "base", "cart", np.eye(4), axis, limits),
+        Joint("spin", JointType.CONTINUOUS, "cart", "wheel", pose(0.5), axis),
+    )
+    robot = Robot(Description("cart", "base", {n: Link(n, collisions=ball) for n in names}, joints))
+    low, high = sampled(robot)
+    np.testing.assert_allclose([low, high], [[4.0, -np.pi], [6.0, np.pi]])
+    assert CollisionModel(robot).free([5.0, 0.0])

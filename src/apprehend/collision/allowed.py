@@ -25,6 +25,9 @@ SAMPLES = 500
 ALWAYS = 0.95
 """Share of the samples from which on a pair counts as always touching."""
 
+OFTEN = 0.5
+"""Share from which on a pair counts as connected, if a joint may connect it."""
+
 DESCRIBED = "allowed by the description"
 COUPLED = "parts of one coupled mechanism"
 ADJACENT = "connected by a joint"
@@ -113,14 +116,17 @@ def by_tree(robot: Robot, links: Sequence[Node]) -> dict[Pair, str]:
     description = robot.description
     reasons = dict.fromkeys(description.allowed_collisions, DESCRIBED)
     reasons |= dict.fromkeys(linkages(robot.model, links), COUPLED)
-    reasons |= dict.fromkeys(neighbours(description, {node.name for node in links}), ADJACENT)
+    reasons |= dict.fromkeys(neighbours(description, {node.name for node in links})[0], ADJACENT)
     return reasons
 
 
 def by_sampling(
     robot: Robot, links: Sequence[Node], clearance: float, samples: int, rng: np.random.Generator
 ) -> tuple[dict[Pair, str], dict[Pair, float]]:
-    """Pairs of `by_tree`, and those that nearly always touch; and how often each of the other pairs does."""
+    """Pairs of `by_tree`, those that nearly always touch, and those that a joint may connect and that often do.
+
+    And how often each of the sampled pairs touches.
+    """
     reasons = by_tree(robot, links)
     tried = [
         pair(a.name, b.name)
@@ -128,12 +134,23 @@ def by_sampling(
         for b in links[:i]
         if a.carrier != b.carrier and pair(a.name, b.name) not in reasons
     ]
-    lower, upper = np.maximum(robot.limits.lower, -np.pi), np.minimum(robot.limits.upper, np.pi)
-    q = rng.uniform(lower, upper, (samples, robot.n))
+    q = rng.uniform(*sampled(robot), (samples, robot.n))
     hits = _touching(robot, links, tried, q, clearance)
     rates = {p: float(count) / samples for p, count in zip(tried, hits, strict=True)}
     reasons |= {p: TOUCHING for p, rate in rates.items() if rate >= ALWAYS}
+    indirect = neighbours(robot.description, {node.name for node in links})[1]
+    reasons |= {p: ADJACENT for p in indirect if rates.get(p, 0.0) >= OFTEN}
     return reasons, rates
+
+
+def sampled(robot: Robot) -> tuple[Array, Array]:
+    """Between which values joints are sampled: their limits; of what turns, one turn; of what slides on, 2π m."""
+    lower, upper = robot.limits.lower, robot.limits.upper
+    low, high = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
+    slides = np.zeros(robot.n, dtype=bool)
+    slides[robot.model.coordinate[robot.model.kind != 0]] = True
+    whole = np.isfinite(lower) & np.isfinite(upper) & (slides | (low >= high))
+    return np.where(whole, lower, low), np.where(whole, upper, high)
 
 
 def _touching(robot: Robot, links: Sequence[Node], pairs: Sequence[Pair], q: Array, clearance: float) -> Array:

@@ -115,20 +115,26 @@ def between(tree: TreeModel, a: int, b: int) -> list[int]:
     return [j for j in up_a if j not in up_b] + [j for j in up_b if j not in up_a]
 
 
-def neighbours(description: Description, shaped: set[str]) -> set[Pair]:
-    """Pairs of links with geometry that one moving joint connects, directly or through links without geometry."""
-    group = {description.root: description.root}  # link → first link of its rigid group
+def neighbours(description: Description, shaped: set[str]) -> tuple[set[Pair], set[Pair]]:
+    """Pairs of links that a joint connects, and pairs that one may connect.
+
+    These stand for links without geometry: everything that is rigid with such a link, of which the joint touches only
+    what is near to it.
+    """
+    group = {description.root: description.root}  # link → the link that its rigid group hangs on
     members: dict[str, list[str]] = {description.root: [description.root]}
     for joint in description.joints:
         group[joint.child] = group[joint.parent] if joint.type is JointType.FIXED else joint.child
         members.setdefault(group[joint.child], []).append(joint.child)
-    pairs = set()
+    direct, indirect = set[Pair](), set[Pair]()
     for joint in description.joints:
         if joint.type is JointType.FIXED:
             continue
-        sides = [[link] if link in shaped else members[group[link]] for link in (joint.parent, joint.child)]
-        pairs |= {pair(a, b) for a in sides[0] for b in sides[1] if a in shaped and b in shaped}
-    return pairs
+        ends = (joint.parent, joint.child)
+        sides = [[link] if link in shaped else members[group[link]] for link in ends]
+        found = {pair(a, b) for a in sides[0] for b in sides[1] if a in shaped and b in shaped}
+        (direct if shaped.issuperset(ends) else indirect).update(found)
+    return direct, indirect - direct
 
 
 def linkages(tree: TreeModel, nodes: Sequence[Node]) -> set[Pair]:
