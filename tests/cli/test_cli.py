@@ -183,3 +183,30 @@ def test_a_reachability_map_is_built_kept_and_asked(tmp_path: Path) -> None:
     wrong = run("reach", "ur5e", "tool")
     assert wrong.returncode == 2
     assert "Did you mean" in wrong.stderr
+
+
+def test_a_mesh_in_millimetres_is_said_in_words_of_the_command_line(tmp_path: Path) -> None:
+    part = tmp_path / "part.obj"
+    part.write_text(CUBE.replace("0.04", "40"))
+    result = run("view", str(part), "--as", "boxes", "--save", str(tmp_path / "boxes.npz"))
+    assert result.returncode == 2
+    assert "--units mm" in result.stderr
+    result = run("view", str(part), "--units", "mm", "--as", "boxes", "--save", str(tmp_path / "boxes.npz"))
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "boxes.npz").is_file()
+
+
+def test_a_scene_is_drawn(tmp_path: Path) -> None:
+    scene = tmp_path / "cell.toml"
+    scene.write_text('[robot]\narm = "ur5e"\n[[box]]\nname = "t"\nsize = [1, 1, 0.1]\npose = {xyz = [1, 0, 0]}\n')
+    result = run("view", str(scene), "--picture", str(tmp_path / "cell.png"))
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "cell.png").read_bytes().startswith(b"\x89PNG")
+    assert "--as shows models of one body" in run("view", str(scene), "--as", "boxes").stderr
+
+
+def test_exit_codes_and_units_are_in_the_help() -> None:
+    told = " ".join(run("plan", "--help").stdout.replace("│", " ").split())
+    assert "Exit code 0: a path, checked; 1: there is none" in told
+    assert "roll,pitch,yaw in rad" in told
+    assert "[default: (as at the start)]" in told

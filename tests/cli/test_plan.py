@@ -78,6 +78,8 @@ def test_no_path_is_exit_code_one_with_the_reason(walled: Path) -> None:
         (("--straight", "--goal", "home"), "--straight goes to one pose"),
         (("--goal", "home", "--frame", "tol0"), "Did you mean 'tool0'"),
         (("--goal", "home", "--out", "path.txt"), "ends in .json or .csv"),
+        (("--goal", "home", "--out", "no/path.csv"), "there is no folder"),
+        (("--goal", "home", "--picture", "path.jpg"), "--picture is path.jpg; expected a name that ends in .png"),
     ],
 )
 def test_mistakes_are_named(options: tuple[str, ...], words: str, tmp_path: Path) -> None:

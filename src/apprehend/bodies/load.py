@@ -159,9 +159,9 @@ def _check_size(points: Array, path: Path) -> None:
     if SMALLEST <= size <= LARGEST:
         return
     names = {"mm": "millimetres", "cm": "centimetres", "in": "inches", "m": "metres"}
-    # the unit under which the thing is nearest to the size of a hand
+    # the unit under which the thing is nearest to the size of a hand; millimetres are the commonest
     fitting = [u for u, factor in UNITS.items() if u != "m" and SMALLEST <= size * factor <= LARGEST]
-    guess = min(fitting, key=lambda u: abs(np.log(size * UNITS[u] / 0.15)), default=None)
+    guess = min(fitting, key=lambda u: abs(np.log(size * UNITS[u] / 0.15)) - (u == "mm"), default=None)
     if guess is not None:
         real = _sizes(extents * UNITS[guess])
         hint = f"{names[guess]}? Pass units={guess!r} ({real} m)"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import console, print_json
+from .options import Json, Port, Units, load_body
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -20,12 +21,10 @@ BodyName = Annotated[str | None, typer.Option(help="of a model: the body that is
 Time = Annotated[float, typer.Option(help="of a model: seconds to simulate from its first keyframe")]
 By = Annotated[str | None, typer.Option(help="of a model: bodies whose contacts count, with commas (default: all)")]
 View = Annotated[bool, typer.Option("--view", help="show contacts and wrench space in the browser")]
-Port = Annotated[int, typer.Option(help="port of the page")]
 Friction = Annotated[float, typer.Option(help="µ of contacts without their own")]
 Model = Annotated[str, typer.Option(help="frictionless, coulomb, soft or soft_box, for contacts without their own")]
 Torsion = Annotated[float, typer.Option(help="γ in m of soft fingers without their own")]
 Picture = Annotated[Path | None, typer.Option(help="write a picture (.png, .svg, .pdf)")]
-Json = Annotated[bool, typer.Option("--json", help="print JSON")]
 
 app = typer.Typer(no_args_is_help=True, help="Judge grasps given as contacts, or plan them.")
 
@@ -138,7 +137,8 @@ def plan(
     n: Annotated[int, typer.Option(help="how many grasps")] = 10,
     method: Annotated[str, typer.Option(help="of hands with several fingers: both, inverse or closing")] = "both",
     friction: Annotated[float | None, typer.Option(help="µ (default: the body's)")] = None,
-    mass: Annotated[float | None, typer.Option(help="of a mesh, in kg")] = None,
+    mass: Annotated[float | None, typer.Option(help="of the body, in kg")] = None,
+    units: Units = None,
     seed: Annotated[int, typer.Option(help="of the random numbers")] = 0,
     view: View = False,
     port: Port = 8080,
@@ -151,7 +151,10 @@ def plan(
     from ..bodies import HOUSEHOLD, Body
     from ..kinematics import Hand
 
-    thing = Body.household(body) if body in HOUSEHOLD and mass is None else Body.load(body, mass=mass)
+    if body in HOUSEHOLD:
+        thing = Body.household(body) if mass is None else Body.household(body).with_(mass=mass)
+    else:
+        thing = load_body(body, mass=mass, units=units)
     gripper = Hand.load(hand)
     found = grasp.plan(gripper, thing, n=n, rng=np.random.default_rng(seed), friction=friction, method=method)
     if as_json:

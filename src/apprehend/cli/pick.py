@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import console, print_json
+from .options import Units, load_body
 
 if TYPE_CHECKING:
     from ..collision import Scene
@@ -20,7 +21,9 @@ MESHES = (".obj", ".stl", ".ply", ".glb", ".off")
 def command(
     target: Annotated[
         str | None,
-        typer.Argument(help="scene (.toml), mesh (.obj, .stl, .ply, .glb, .off) or household object", show_default="mug"),
+        typer.Argument(
+            help="scene (.toml), mesh (.obj, .stl, .ply, .glb, .off) or household object", show_default="mug"
+        ),
     ] = None,
     robot: Annotated[str | None, typer.Option(help="catalogue name or description file", show_default="ur5e")] = None,
     hand: Annotated[
@@ -33,7 +36,7 @@ def command(
     ] = False,
     mass: Annotated[float | None, typer.Option(help="of the object, in kg")] = None,
     friction: Annotated[float | None, typer.Option(help="Coulomb coefficient of the object")] = None,
-    units: Annotated[str, typer.Option(help="of the mesh file: m, cm, mm, in")] = "m",
+    units: Units = None,
     out: Annotated[Path | None, typer.Option(help="directory for episode.json and report.html")] = None,
     view: Annotated[bool, typer.Option("--view", help="replay the episode in the browser afterwards")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="print the verdict and the steps as JSON")] = False,
@@ -73,7 +76,7 @@ def build_scene(target: str | None, robot: str | None, hand: str | None, **body_
     from ..collision import Scene
     from ..errors import InputError, unknown_name
 
-    given = {k: v for k, v in body_options.items() if v is not None and (k, v) != ("units", "m")}
+    given = {k: v for k, v in body_options.items() if v is not None}
     if target is not None and target.endswith(".toml"):
         extra = [f"--{k}" for k, v in {"robot": robot, "hand": hand, **given}.items() if v is not None]
         if extra:
@@ -81,7 +84,7 @@ def build_scene(target: str | None, robot: str | None, hand: str | None, **body_
         return Scene.load(target)
     name = target or "mug"
     if name.lower().endswith(MESHES):
-        body = Body.load(name, **given)
+        body = load_body(name, **given)
     elif name in HOUSEHOLD:
         if given:
             raise InputError(

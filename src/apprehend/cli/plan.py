@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import console, print_json
+from .options import Browser, Json, Port, is_scene
 
 if TYPE_CHECKING:
     from ..arrays import Array
     from ..collision import Scene
     from ..kinematics import Robot
     from ..planning import PlanResult
+
+EPILOG = "Exit code 0: a path, checked; 1: there is none, and the reason is printed; 2: wrong input."
 
 BRANCHES = 32
 """Postures that are sought for a goal that is a pose."""
@@ -23,14 +26,20 @@ def command(
     what: Annotated[str, typer.Argument(help="scene (.toml), catalogue name or description file of a robot")],
     goal: Annotated[
         list[str] | None,
-        typer.Option("--goal", help="joint values a,b,… or joint=value,… or 'home'; may be given again: any of them"),
+        typer.Option(
+            "--goal", help="joint values a,b,… (rad, m) or joint=value,… or 'home'; may be given again: any of them"
+        ),
     ] = None,
     xyz: Annotated[
         list[str] | None, typer.Option(help="goal as position x,y,z of --frame in m; may be given again")
     ] = None,
-    rpy: Annotated[str | None, typer.Option(help="with --xyz: fixed-axis roll,pitch,yaw", show_default="0,0,0")] = None,
-    start: Annotated[str, typer.Option(help="joint values, joint=value,… or 'home'")] = "home",
-    frame: Annotated[str | None, typer.Option(help="frame of --xyz, --upright and the drawn way")] = None,
+    rpy: Annotated[
+        str | None, typer.Option(help="with --xyz: fixed-axis roll,pitch,yaw in rad", show_default="as at the start")
+    ] = None,
+    start: Annotated[str, typer.Option(help="joint values a,b,… (rad, m), joint=value,… or 'home'")] = "home",
+    frame: Annotated[
+        str | None, typer.Option(help="frame of --xyz, --upright and the drawn way", show_default="the tool")
+    ] = None,
     straight: Annotated[bool, typer.Option("--straight", help="move --frame to --xyz in a straight line")] = False,
     upright: Annotated[
         float | None,
@@ -44,15 +53,18 @@ def command(
     out: Annotated[Path | None, typer.Option(help="write the path (.json or .csv), for 'apprehend trajectory'")] = None,
     picture: Annotated[Path | None, typer.Option(help="draw the path (.png)")] = None,
     view: Annotated[bool, typer.Option("--view", help="show the path in the browser, with a slider")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
+    port: Port = 8080,
+    browser: Browser = True,
+    as_json: Json = False,
 ) -> int:
-    """Exit code 0: a path, checked; 1: there is none, and why; 2: wrong input."""
+    """Exit code 0: a path, checked; 1: there is none, and why; 2: wrong input. See `EPILOG`."""
     import numpy as np
 
     from .. import planning
     from ..collision import CollisionModel
     from ..errors import InputError
 
+    check_names(out, picture)
     scene, robot = read(what)
     rng = np.random.default_rng(seed)
     q0 = posture(start, "--start", robot, deg)
@@ -83,8 +95,20 @@ def command(
     if view and result.success:
         from .. import viewer
 
-        viewer.show_path(scene or robot, result.path, tool, announce=console.print)
+        page: dict[str, Any] = {"port": port, "open_browser": browser, "announce": console.print}
+        viewer.show_path(scene or robot, result.path, tool, model=model, **page)
     return 0 if result.success else 1
+
+
+def check_names(out: Path | None, picture: Path | None) -> None:
+    """Refuse names of files that cannot be written, before anything is computed."""
+    from ..errors import InputError
+
+    for name, path, endings in (("--out", out, (".json", ".csv")), ("--picture", picture, (".png",))):
+        if path is not None and path.suffix.lower() not in endings:
+            raise InputError(f"{name} is {path}; expected a name that ends in {' or '.join(endings)}")
+        if path is not None and not path.absolute().parent.is_dir():
+            raise InputError(f"{name} is {path}, but there is no folder {path.absolute().parent}")
 
 
 def read(what: str) -> tuple[Scene | None, Robot]:
@@ -93,7 +117,7 @@ def read(what: str) -> tuple[Scene | None, Robot]:
     from ..kinematics import Robot
 
     path = Path(what)
-    if path.suffix == ".toml" and (not path.exists() or "[robot]" in path.read_text()):
+    if is_scene(path):
         scene = Scene.load(path)
         return scene, scene.robot
     return None, Robot.load(what)
@@ -127,7 +151,7 @@ def posture(text: str, name: str, robot: Robot, deg: bool, base: Array | None = 
 
 
 def _frame(robot: Robot, frame: str | None) -> str:
-    from ..viewer.paths import tool_of
+    from ..viewer.along import tool_of
 
     name = frame or tool_of(robot)
     robot.frame_index(name)
@@ -178,8 +202,10 @@ def show(
     written = write(result, robot, out) if out is not None and result.success else None
     if picture is not None and result.success:
         from .. import viewer
+        from ..files import replace_file
 
-        picture.write_bytes(viewer.png(viewer.render_path(scene or robot, result.path, tool)))
+        with replace_file(picture) as work:
+            work.write_bytes(viewer.png(viewer.render_path(scene or robot, result.path, tool)))
     if as_json:
         print_json(facts(result, robot))
         return
@@ -210,11 +236,8 @@ def write(result: PlanResult, robot: Robot, out: Path) -> Path:
 
     import numpy as np
 
-    from ..errors import InputError
     from ..files import replace_file
 
-    if out.suffix not in (".json", ".csv"):
-        raise InputError(f"--out is {out}; expected a name that ends in .json or .csv")
     with replace_file(out) as work:
         if out.suffix == ".json":
             work.write_text(json.dumps(result.path.tolist()))

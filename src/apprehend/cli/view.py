@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import console
+from .options import Browser, Port, Units, is_scene, load_body
 
 if TYPE_CHECKING:
     from ..bodies import Body
@@ -18,9 +19,12 @@ FLAT = (".svg", ".pdf")
 
 
 def command(
-    what: Annotated[str, typer.Argument(help="episode.json (or its directory), a mesh, a household body, or a robot")],
-    port: Annotated[int, typer.Option(help="port of the page")] = 8080,
-    browser: Annotated[bool, typer.Option(help="open the page in the default browser")] = True,
+    what: Annotated[
+        str,
+        typer.Argument(help="episode.json (or its directory), a mesh, a household body, a robot, or a scene (.toml)"),
+    ],
+    port: Port = 8080,
+    browser: Browser = True,
     model: Annotated[
         str | None,
         typer.Option(
@@ -31,6 +35,7 @@ def command(
     ] = None,
     count: Annotated[int | None, typer.Option(help="most shapes (or faces) of the model")] = None,
     resolution: Annotated[float | None, typer.Option(help="side of voxels, spacing of a field, in m")] = None,
+    units: Units = None,
     view: Annotated[str | None, typer.Option(help="draw in the plane, as seen from: front, side, top")] = None,
     picture: Annotated[
         Path | None, typer.Option(help="write a picture instead of opening a page: .png, or .svg, .pdf in the plane")
@@ -50,11 +55,28 @@ def command(
     if path.is_dir() or path.suffix == ".json":
         viewer.show(path, **page)
     elif path.suffix.lower() in FORMATS:
-        _body(Body.load(path), model, count, resolution, view, picture, save, page)
+        _body(load_body(path, units=units), model, count, resolution, view, picture, save, page)
     elif what in HOUSEHOLD:
         _body(Body.household(what), model, count, resolution, view, picture, save, page)
+    elif is_scene(path):
+        _scene(path, model, picture, page)
     else:
         _robot(Robot.load(what), model, count, view, picture, save, page)
+
+
+def _scene(path: Path, model: str | None, picture: Path | None, page: dict[str, Any]) -> None:
+    from .. import viewer
+    from ..collision import Scene
+    from ..errors import InputError
+
+    if model is not None:
+        raise InputError("--as shows models of one body or robot, not of a scene; name the body or the robot")
+    scene = Scene.load(path)
+    if picture is not None:
+        _write(picture, viewer.render(scene))
+        console.print(f"wrote {picture}")
+    else:
+        viewer.show_robot(scene, **page)
 
 
 def _body(

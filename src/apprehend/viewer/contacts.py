@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, as_array
 from ..errors import InputError
-from .live import HOST, Announce, Page
+from .live import Page, Serving, serve
 from .looks import RGBA
 from .marks import Mesh, arrow, ball, friction_cone
 from .picture import Camera, corners_of
@@ -28,12 +28,7 @@ BALL: RGBA = (0.85, 0.35, 0.20, 0.60)
 def show_contacts(
     grasp: Grasp,
     forces: ArrayLike | None = None,
-    *,
-    port: int = 8080,
-    host: str = HOST,
-    open_browser: bool = True,
-    block: bool = True,
-    announce: Announce | None = None,
+    **serving: Unpack[Serving],
 ) -> Page:
     """A page with the contacts of *grasp* in space, its body if it has one, and contact *forces* ``(m,)`` as arrows.
 
@@ -45,13 +40,8 @@ def show_contacts(
     f = None if forces is None else as_array(forces, "forces")
     if f is not None and f.shape != (grasp.matrix.shape[1],):
         raise InputError(f"forces has shape {f.shape}; expected ({grasp.matrix.shape[1]},)")
-    page = Page("contacts of a grasp" if grasp.body is None else f"contacts on {grasp.body.name}", port=port, host=host)
-    try:
-        _draw(page, grasp, f)
-    except BaseException:
-        page.stop()
-        raise
-    return page.serve(open_browser=open_browser, block=block, announce=announce)
+    title = "contacts of a grasp" if grasp.body is None else f"contacts on {grasp.body.name}"
+    return serve(title, lambda page: _draw(page, grasp, f), **serving)
 
 
 def wrench_space(grasp: Grasp, part: str, at: Array) -> tuple[Mesh, Mesh]:

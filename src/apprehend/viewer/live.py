@@ -9,7 +9,7 @@ import threading
 import webbrowser
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stdout
-from typing import Any, Self
+from typing import Any, Self, TypedDict, Unpack
 
 import numpy as np
 
@@ -23,6 +23,39 @@ HOST = "127.0.0.1"
 """The page is served to this machine only, unless another host is asked for."""
 
 Announce = Callable[[str], object]
+
+
+class Serving(TypedDict, total=False):
+    """How a page is served: the options that all functions share that show something."""
+
+    port: int
+    """Where, or the next free one; 8080."""
+    host: str
+    """Who can see it: this machine (`HOST`)."""
+    open_browser: bool
+    """Whether the default browser opens it; True."""
+    block: bool
+    """Whether the call returns only when the page is stopped or interrupted; True."""
+    announce: Announce | None
+    """Called with a line that says where the page is."""
+
+
+def serve(title: str, build: Callable[[Page], object], **serving: Unpack[Serving]) -> Page:
+    """Serve a page with what *build* puts on it; a page that cannot be built is stopped."""
+    unknown = set(serving) - set(Serving.__annotations__)
+    if unknown:
+        raise TypeError(f"pages have no option {sorted(unknown)[0]!r}; there are {', '.join(Serving.__annotations__)}")
+    page = Page(title, port=serving.get("port", 8080), host=serving.get("host", HOST))
+    try:
+        build(page)
+    except BaseException:
+        page.stop()
+        raise
+    return page.serve(
+        open_browser=serving.get("open_browser", True),
+        block=serving.get("block", True),
+        announce=serving.get("announce"),
+    )
 
 
 class Page:

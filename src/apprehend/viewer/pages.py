@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ..arrays import Array, choice
 from ..bodies import MODELS
 from ..errors import ApprehendError, InputError
 from .draw import overlaid, stage_of
-from .live import HOST, Announce, Page
+from .live import Page, Serving, serve
 from .looks import RGBA, link_parts
 from .marks import arrow, friction_cone
 from .models import things
@@ -23,6 +23,7 @@ from .words import number, significant
 
 if TYPE_CHECKING:
     from ..bodies import Body, RestPose
+    from ..collision import Scene
     from ..grasp.candidates import Candidate
     from ..kinematics import Hand, LinkModels, Robot
 
@@ -31,27 +32,20 @@ NO_MODEL = "none"
 
 
 def show_robot(
-    robot: Robot,
+    what: Robot | Scene,
     *,
-    port: int = 8080,
-    host: str = HOST,
-    open_browser: bool = True,
-    block: bool = True,
-    announce: Announce | None = None,
     models: LinkModels | None = None,
+    **serving: Unpack[Serving],
 ) -> Page:
-    """A page with *robot* and a slider for every joint, in degrees or millimetres; frames can be shown.
+    """A page with a robot (in its scene) and a slider for every joint, in degrees or millimetres; frames can be shown.
 
     With *models* of its links, these are laid over them.
     """
-    stage = stage_of(robot) if models is None else overlaid(robot, models)
-    page = Page(robot.name, port=port, host=host)
-    try:
-        _robot_controls(page, robot, stage)
-    except BaseException:
-        page.stop()
-        raise
-    return page.serve(open_browser=open_browser, block=block, announce=announce)
+    stage = stage_of(what) if models is None else overlaid(what, models)
+    robot = stage.robot
+    if robot is None:
+        raise InputError(f"there is no robot in a {type(what).__name__}; pass a robot or a scene")
+    return serve(robot.name, lambda page: _robot_controls(page, robot, stage), **serving)
 
 
 def _robot_controls(page: Page, robot: Robot, stage: Stage) -> None:
@@ -106,23 +100,13 @@ def _robot_controls(page: Page, robot: Robot, stage: Stage) -> None:
 def show_body(
     body: Body,
     *,
-    port: int = 8080,
-    host: str = HOST,
-    open_browser: bool = True,
-    block: bool = True,
-    announce: Announce | None = None,
     model: str | None = None,
+    **serving: Unpack[Serving],
 ) -> Page:
     """A page with *body*: its mass properties, its resting poses, and its models (*model*: the one shown first)."""
     if model is not None:
         choice(model, "model", MODELS[1:])
-    page = Page(body.name, port=port, host=host)
-    try:
-        _body_controls(page, body, model)
-    except BaseException:
-        page.stop()
-        raise
-    return page.serve(open_browser=open_browser, block=block, announce=announce)
+    return serve(body.name, lambda page: _body_controls(page, body, model), **serving)
 
 
 def _body_controls(page: Page, body: Body, model: str | None = None) -> None:
@@ -207,12 +191,7 @@ def show_grasp(
     body: Body,
     candidates: Candidate | Sequence[Candidate],
     hand: Hand,
-    *,
-    port: int = 8080,
-    host: str = HOST,
-    open_browser: bool = True,
-    block: bool = True,
-    announce: Announce | None = None,
+    **serving: Unpack[Serving],
 ) -> Page:
     """A page with *body* and *hand* at each of the *candidates* (best first), contacts and friction cones drawn."""
     from ..grasp.candidates import Candidate
@@ -220,13 +199,7 @@ def show_grasp(
     options = [candidates] if isinstance(candidates, Candidate) else list(candidates)
     if not options:
         raise InputError("there are no grasps to show: candidates is empty; the plan's explain() says why")
-    page = Page(f"grasps of {body.name}", port=port, host=host)
-    try:
-        _grasp_controls(page, body, options, hand)
-    except BaseException:
-        page.stop()
-        raise
-    return page.serve(open_browser=open_browser, block=block, announce=announce)
+    return serve(f"grasps of {body.name}", lambda page: _grasp_controls(page, body, options, hand), **serving)
 
 
 def _grasp_controls(page: Page, body: Body, options: Sequence[Candidate], hand: Hand) -> None:

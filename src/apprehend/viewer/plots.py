@@ -47,6 +47,8 @@ class Chart:
     high: float | None = None
     digits: int = 1
     note: str = ""
+    axis: str = "s"
+    """The unit of *time*; along a path it is % of the length."""
 
 
 def svg(chart: Chart, width: int, height: int, *, labels: bool = True, clock: bool = True) -> str:

@@ -6,14 +6,14 @@ import html
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
 from .charts import load_charts
-from .live import HOST, Announce, Page
+from .live import Page, Serving, serve
 from .marks import ball, friction_cone, tube
 from .plots import Chart
 from .record import Record
@@ -35,29 +35,18 @@ PLOT_POINTS = 400
 
 def show(
     episode: str | Path | Mapping[str, Any] | Episode,
-    *,
-    port: int = 8080,
-    host: str = HOST,
-    open_browser: bool = True,
-    block: bool = True,
-    announce: Announce | None = None,
+    **serving: Unpack[Serving],
 ) -> Page:
-    """Replay *episode* (file, directory, data, or `Episode`) on a page at *port* (or the next free one).
-
-    With *block* the call returns when the page is stopped or interrupted; *announce* is called with a line that says
-    where it is. Only this machine can see the page unless another *host* is given.
-    """
+    """Replay *episode* (file, directory, data, or `Episode`) on a page; *serving*: see `Serving`."""
     data, stage = read(episode)
     record = Record.of(data)
-    page = Page(data["title"], port=port, host=host)
-    try:
+
+    def build(page: Page) -> None:
         page.add(stage)
         page.look(Studio.of(stage, record).camera((1400, 900)))
         Player(page, stage, record, data)
-    except BaseException:
-        page.stop()
-        raise
-    return page.serve(open_browser=open_browser, block=block, announce=announce)
+
+    return serve(data["title"], build, **serving)
 
 
 class Player:
@@ -114,7 +103,7 @@ class Player:
             gui.add_html(_steps(data))
         with tabs.add_tab("Loads"):
             for chart in load_charts(self.record, data):
-                _plot(gui, chart)
+                plot(gui, chart)
         with tabs.add_tab("Show"):
             self._shown = gui
 
@@ -207,13 +196,13 @@ def _steps(data: Mapping[str, Any]) -> str:
     return f'<div style="font-size:13px;line-height:1.4;padding:2px 10px">{"".join(rows)}</div>'
 
 
-def _plot(gui: Any, chart: Chart) -> None:
+def plot(gui: Any, chart: Chart) -> None:
     """A chart of the report as one of the page's own plots."""
     from viser import uplot
 
     keep = np.unique(np.linspace(0, len(chart.time) - 1, PLOT_POINTS).astype(int))
     columns: list[Array] = [chart.time[keep], *(np.asarray(line.values[keep]) for line in chart.lines)]
-    series = [uplot.Series(label="s")]
+    series = [uplot.Series(label=chart.axis)]
     for line in chart.lines:
         colour = COLOURS[line.shade] if line.shade >= 0 else QUIET
         series.append(uplot.Series(label=line.label, stroke=colour, width=1.5))
