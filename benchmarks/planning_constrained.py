@@ -167,7 +167,7 @@ def ompl_time(model: CollisionModel, keep: Constraints, start: np.ndarray, goals
 
 
 def run(name: str, title: str, count: int, peer: bool, seed: int) -> None:
-    planning, shortened, theirs, violations, lengths, free = [], [], [], [], [], 0
+    planning, shortened, theirs, violations, lengths, free, theirs_only = [], [], [], [], [], 0, 0
     for number, (model, keep, start, goals) in enumerate(problems(name, title, count, seed)):
         if number == 0:
             plan(model, start, goals, rng=np.random.default_rng(0), constraints=keep.items, time_limit=LIMIT)
@@ -186,6 +186,7 @@ def run(name: str, title: str, count: int, peer: bool, seed: int) -> None:
             lengths.append(result.length)
         if peer:
             theirs.append(ompl_time(model, keep, start, goals))
+            theirs_only += theirs[-1] is not None and not result.success
     if not planning:
         print(f"{name:<6} {title:<21}   0 of {count} solved")
         return
@@ -198,7 +199,8 @@ def run(name: str, title: str, count: int, peer: bool, seed: int) -> None:
         solved = [t for t in theirs if t is not None]
         # those that it did not solve within the limit count as the limit
         mid = 1e3 * np.median([LIMIT if t is None else t for t in theirs])
-        print(f"{'':6} {'OMPL':<21} {len(solved):3} of {count} solved   {mid:7.1f} ms   ratio {mid / ours:.0f}")
+        print(f"{'':6} {'OMPL':<21} {len(solved):3} of {count} solved   {mid:7.1f} ms   ratio {mid / ours:.0f}", end="")
+        print(f"   solved by OMPL only: {theirs_only}")
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ from apprehend.collision import Box, CollisionModel, RobotSource, Scene
 from apprehend.errors import InputError
 from apprehend.kinematics import Robot
 from apprehend.planning import Constraints, Inside, PlanStatus, Turned, Upright, plan, smooth
+from apprehend.robots import Description, Joint, JointLimits, JointType, Link, Shape, ShapeKind
 from tests.collision.makers import gantry, planar, pose, rotation
 
 
@@ -150,6 +151,41 @@ def test_projection_ends_on_the_constraints(ur5e: Robot) -> None:
     still = np.array([True, True, False, True, True, True])
     moved, _ = Constraints(ur5e, keep.items, still).project(q, lower, upper)
     np.testing.assert_array_equal(moved[:, 2], q[:, 2])
+
+
+def mobile() -> Robot:
+    """A base that slides and turns without limits, and an arm in a vertical plane on it."""
+    names = ["floor", "x", "y", "base", "upper", "fore", "hand"]
+    links = {name: Link(name) for name in names}
+    for name in names[4:]:
+        links[name] = Link(name, collisions=(Shape(ShapeKind.BOX, (0.06, 0.06, 0.3), pose(0.0, 0.0, 0.2)),))
+    links["base"] = Link("base", collisions=(Shape(ShapeKind.CYLINDER, (0.2, 0.3), pose(0.0, 0.0, 0.15)),))
+    kinds = [JointType.PRISMATIC] * 2 + [JointType.CONTINUOUS] + [JointType.REVOLUTE] * 3
+    axes = [(1, 0, 0), (0, 1, 0), (0, 0, 1)] + [(0, 1, 0)] * 3
+    places = [pose()] * 3 + [pose(0.0, 0.0, 0.4)] * 3
+    bounds = [JointLimits(-3.0, 3.0)] * 2 + [JointLimits()] + [JointLimits(-2.5, 2.5)] * 3
+    joints = tuple(
+        Joint(f"joint {i}", kinds[i], names[i], names[i + 1], places[i], np.array(axes[i], float), bounds[i])
+        for i in range(6)
+    )
+    return Robot(Description("mobile", "floor", links, joints))
+
+
+def test_a_mobile_robot_carries_upright_at_one_height() -> None:
+    robot = mobile()
+    model = model_of(robot, Box("wall", np.array([0.1, 3.0, 1.0]), pose(0.0, 0.0, 0.5)))
+    items = [Upright("hand", angle=0.15), Inside("hand", (-9.0, -9.0, 0.7), (9.0, 9.0, 0.9))]
+    start = np.array([-1.5, 0.0, 0.0, -0.9, 1.9, -1.0])
+    goal = np.array([1.5, 0.3, 15.0, -0.9, 1.9, -1.0])
+    result = plan(model, start, goal, rng=np.random.default_rng(0), constraints=items, time_limit=20.0, smooth=True)
+    path = result.require_success().path
+    np.testing.assert_allclose(path[-1, 2], 15.0 - 4.0 * np.pi, atol=1e-9)  # modulo a turn
+    np.testing.assert_array_equal(np.delete(path[-1], 2), np.delete(goal, 2))
+    points = dense(path)
+    hand = robot.fk(points, "hand")
+    assert np.arccos(np.clip(hand[:, 2, 2], -1.0, 1.0)).max() <= 0.15 + 1e-8
+    assert (np.abs(hand[:, 2, 3] - 0.8) <= 0.1 + 1e-8).all()
+    assert (model.distance(points) > -model.resolution).all()
 
 
 def test_two_arms_keep_what_one_of_them_holds() -> None:

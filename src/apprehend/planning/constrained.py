@@ -20,7 +20,7 @@ WIDEST, NARROWEST = 0.5, 0.25
 FIRST_ROOM = 512
 """Nodes that a tree has room for at first."""
 
-PORTION = 64
+PORTION = 16
 """Random configurations between looks at the clock."""
 
 NOTHING = np.empty((0, 2))

@@ -94,7 +94,10 @@ class Inside:
 
 @dataclass(frozen=True, eq=False)
 class Turned:
-    """*frame* stays turned as *rotation* (3, 3) within a rotation vector of ± *tolerance* (3,) rad, in its axes."""
+    """*frame* stays turned as *rotation* (3, 3) within a rotation vector of ± *tolerance* (3,) rad, in its axes.
+
+    A tolerance of π or more leaves that component free.
+    """
 
     frame: str
     rotation: ArrayLike
@@ -105,8 +108,8 @@ class Turned:
         if R.shape != (3, 3) or np.abs(R @ R.T - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0.0:
             raise InputError("rotation of a constraint must be one rotation matrix (3, 3)")
         tolerance = np.broadcast_to(as_array(self.tolerance, "tolerance"), (3,)).astype(np.float64)
-        if not ((tolerance > 0.0).all() and np.linalg.norm(np.minimum(tolerance, 9.0)) < 5.5):
-            raise InputError(f"tolerance is {tolerance.tolist()}; expected three positive angles below π, in rad")
+        if not (tolerance > 0.0).all():
+            raise InputError(f"tolerance is {tolerance.tolist()}; expected three positive angles in rad (π: free)")
         object.__setattr__(self, "rotation", R)
         object.__setattr__(self, "tolerance", tolerance)
 

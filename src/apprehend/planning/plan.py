@@ -50,8 +50,8 @@ def plan(
     the goals say. Angles of joints without limits are taken modulo a turn. Every motion of the path was checked as
     `CollisionModel.edges_free` does.
 
-    *constraints* (`Upright`, `Inside`, `Turned`) hold all along the path; they are kept by moving every new
-    configuration onto them. Start and goals must keep them themselves.
+    *constraints* (`Upright`, `Inside`, `Turned`) hold all along the path, between its configurations, too: proven to
+    1e-9 rad or m. Every new configuration is moved onto them; start and goals must keep them themselves.
 
     The same *rng* state gives the same path, unless the time runs out. Raises `InputError` for arrays of the wrong
     shape; whatever the numbers lead to is in the answer's status.
