@@ -26,6 +26,10 @@ POSTURES = 20000
 """Random postures that are judged as pre-grasps."""
 CAGES = 300
 """How many of them are kept."""
+APART = 0.01
+"""Fingers that close on one place aim this far from it, each from its own side, in m."""
+LEAST_SHARE = 0.08
+"""Every pad presses at least with that share of all forces when pads are asked how well they oppose each other."""
 SPAN = 2.0
 """A floating palm may turn this much beyond a half turn, and move this many reaches of the hand, either way."""
 
@@ -34,12 +38,13 @@ SPAN = 2.0
 class Cages:
     """Pre-grasp postures ``q (P, n)`` whose pads all face one place, the *focus* ``(P, 3)`` in the hand frame.
 
-    *pads* ``(P, k, 3)``: where the pads are; *approach* ``(P, 3)``: from the palm to the focus.
+    *targets* ``(P, k, 3)``: where the pads go when they close, each a little to its own side of the focus (or of the
+    line through it that long things lie along); *approach* ``(P, 3)``: from the palm to the focus.
     """
 
     q: Array
     focus: Array
-    pads: Array
+    targets: Array
     approach: Array
 
 
@@ -176,10 +181,11 @@ class Fingers:
 
     @cached_property
     def cages(self) -> Cages:
-        """Random postures, best first, whose pads face one place from around it: where an object can be held.
+        """Random postures whose pads face one place from around it: where an object can be held.
 
-        The focus is the point nearest to the rays that leave the pads. A posture is better the nearer the rays pass,
-        and the more the pads face each other; it must not collide with itself, nor have the focus behind a pad.
+        The focus is the point nearest to the rays that leave the pads. Half of the postures are for round things, half
+        for long ones: a posture is better the nearer the rays pass the focus, or any line through it, and the better
+        the pads can oppose each other; it must not collide with itself, nor have the focus behind a pad.
         """
         robot = self.robot
         rng = np.random.default_rng(0xCA6E)
@@ -191,12 +197,22 @@ class Fingers:
         ]
         to = focus[:, None] - points
         depth = np.einsum("nki,nki->nk", to, normals)
-        miss = np.linalg.norm(np.einsum("nkij,nkj->nki", A, to), axis=-1).mean(axis=1)
-        balance = np.linalg.norm(normals.mean(axis=1), axis=-1)
-        near = depth.min(axis=1)
-        score = balance + 10.0 * miss / self.reach + np.where(near < 0.05 * self.reach, 10.0, 0.0)
-        order = np.argsort(score, kind="stable")[: 3 * CAGES]
-        order = order[self.own.free(q[order])][:CAGES]
+        aside = np.einsum("nkij,nkj->nki", A, to)
+        line = np.linalg.eigh(np.einsum("nki,nkj->nij", aside, aside))[1][..., -1]  # what most misses lie along
+        across = aside - np.einsum("nki,ni->nk", aside, line)[..., None] * line[:, None]
+        unopposed = 10.0 * (depth.min(axis=1) < 0.05 * self.reach) + _unopposed(normals)
+        shift = np.einsum("nki,ni->nk", -to, line)[..., None] * line[:, None]
+        kept: list[int] = []
+        ends: list[Array] = []
+        for miss in (aside, across):
+            score = unopposed + 10.0 * np.linalg.norm(miss, axis=-1).mean(axis=1) / self.reach
+            first = np.argsort(score, kind="stable")[: 3 * CAGES]
+            first = first[~np.isin(first, kept)]
+            first = first[self.own.free(q[first])][: CAGES // 2]
+            place = focus[first, None] + (shift[first] if miss is across else 0.0)
+            ends.append(place + APART * _unit(points[first] - place))
+            kept += first.tolist()
+        order = np.array(kept, dtype=np.int64)
         if not len(order):
             raise DescriptionError(
                 f"hand {self.hand.name!r} collides with itself in all postures that were tried; is its geometry right?"
@@ -205,7 +221,7 @@ class Fingers:
         own = [s for o, s in zip(self.owner, self.shapes, strict=True) if robot.frame_names[o] == self.hand.palm]
         middle = np.mean([s.ball[0] for s in own], axis=0) if own else np.zeros(3)
         towards = focus[order] - (palm[:, :3, :3] @ middle + palm[:, :3, 3])
-        return Cages(q[order], focus[order], points[order], _unit(towards))
+        return Cages(q[order], focus[order], np.concatenate(ends), _unit(towards))
 
     @cached_property
     def floating(self) -> Robot:
@@ -247,6 +263,19 @@ def fingers_of(hand: Hand) -> Fingers:
 
 def _unit(v: Array) -> Array:
     out: Array = v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
+    return out
+
+
+def _unopposed(normals: Array) -> Array:
+    """How far from zero ``(N,)`` the best mixture of unit vectors ``(N, k, 3)`` stays in which each has a share."""
+    k = normals.shape[1]
+    share = np.full(normals.shape[:2], 1.0 / k)
+    free = 1.0 - k * LEAST_SHARE
+    for step in range(12):
+        total = np.einsum("nk,nki->ni", share, normals)
+        corner = np.eye(k)[np.argmin(np.einsum("nki,ni->nk", normals, total), axis=1)]
+        share += 2.0 / (step + 3.0) * (LEAST_SHARE + free * corner - share)
+    out: Array = np.linalg.norm(np.einsum("nk,nki->ni", share, normals), axis=-1)
     return out
 
 

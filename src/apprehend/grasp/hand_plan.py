@@ -23,6 +23,8 @@ from .surface import Surface
 
 BATCH = 96
 """Hands that are placed at once."""
+ENOUGH, MORE = 4, 3
+"""With fewer grasps than ENOUGH up to MORE times as many are tried."""
 PLACES = 16000
 """Placements of pre-grasps from which the inverse way chooses its contacts; of thrice as many if not all are wanted."""
 REACH = 0.06
@@ -31,8 +33,6 @@ EASY = 0.02
 """Contacts that are that far from their pads, in m, count half."""
 SLANT = np.radians(50.0)
 """Largest angle between the way a pad faces and the normal of its contact."""
-APART = 0.01
-"""Fingers that close on one place aim this far from it, each from its own side, in m."""
 OPEN = 0.035
 """A pre-grasp with its pads drawn back by that much must have room where it is placed, in m."""
 CLEARANCE = 1e-3
@@ -68,9 +68,12 @@ class HandSearch:
         """Plan, sort, and say why there is nothing."""
         ways = {"inverse": self._inverse, "closing": self._closing}
         share = -(-self.n // len(self.settings.methods))
-        for method in self.settings.methods:
-            while self.tried[method] < self.settings.samples and self._count(method) < 2 * share:
-                ways[method]()
+        for more in (1, MORE):
+            for method in self.settings.methods:
+                while self.tried[method] < more * self.settings.samples and self._count(method) < 2 * share:
+                    ways[method]()
+            if len(self.found) >= min(self.n, ENOUGH):
+                break
         self.found.sort(key=lambda c: -c.quality)
         chosen = self._distinct()
         facts = {f"tried_{m}": float(self.tried[m]) for m in self.settings.methods}
@@ -224,7 +227,10 @@ class HandSearch:
         if not len(pick):
             self.rejected["hits the table"] += BATCH
             return
-        q, focus = fingers.cages.q[pick], fingers.cages.focus[pick]
+        cages = fingers.cages
+        q = retract(fingers, cages.q[pick], OPEN)
+        tight = ~fingers.own.free(q)
+        q[tight] = cages.q[pick[tight]]
         room = np.zeros(len(pick), np.bool_)
         for back in np.linspace(0.0, 0.06, 9):  # the deepest place with room
             left = np.flatnonzero(~room)
@@ -234,9 +240,7 @@ class HandSearch:
             pose[left[free]], room[left[free]] = trial[free], True
         self.rejected["no room for the open hand"] += int((~room).sum())
         if room.any():
-            aside = fingers.cages.pads[pick][room] - focus[room][:, None]
-            aside /= np.linalg.norm(aside, axis=-1, keepdims=True)
-            self._close(q[room], pose[room], focus[room][:, None] + APART * aside, "closing")
+            self._close(q[room], pose[room], cages.targets[pick[room]], "closing")
 
     # what both share
 

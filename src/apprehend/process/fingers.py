@@ -12,8 +12,8 @@ from ..errors import InputError
 from ..grasp import ContactForces, HandCandidate, Limits, hand_jacobian
 from ..sim import Fingers, Held, close_fingers, held_in
 from .context import Context
-from .grasping import FORCE_FACTOR, SAFETY, SLIP
-from .motion import ACCELERATION, in_hand
+from .grasping import FINGER_SAFETY, FORCE_FACTOR, SLIP
+from .motion import acceleration_of, in_hand
 from .posture import closed, opened
 from .step import Outcome
 
@@ -28,6 +28,9 @@ MOST_TURN = 0.5
 
 RESERVE = 0.9
 """Share of the joints' efforts that contact forces may take."""
+
+LEAST_FORCE = 3.0
+"""Normal force in N that a contact may always take: less than the joints' dry friction holds nothing."""
 
 FIRST = 0.3
 """Share of the forces with which the fingers press until the contacts are felt anew."""
@@ -116,7 +119,7 @@ def felt_grip(context: Context) -> Grip | str:
     bound = RESERVE * np.where(np.isfinite(effort) & (effort > 0.0), effort, 1e6)
     weight = np.zeros(6)
     weight[:3] = -context.body.mass * GRAVITY * held.pose[2, :3]
-    hard = SAFETY * (1.0 + ACCELERATION / GRAVITY) * weight
+    hard = FINGER_SAFETY * (1.0 + acceleration_of(context) / GRAVITY) * weight
 
     def forces(wrench: Array, objective: str, normal: float | None = None) -> ContactForces:
         found = held.grasp.contact_forces(
@@ -129,7 +132,7 @@ def felt_grip(context: Context) -> Grip | str:
     least = forces(hard, "min_largest")
     if not least.success:
         return f"the contacts of {', '.join(links)} cannot hold the weight with the torques of the joints"
-    best = forces(weight, "max_margin", FORCE_FACTOR * least.value)
+    best = forces(weight, "max_margin", max(FORCE_FACTOR * least.value, LEAST_FORCE))
     if not best.success:
         return f"no contact forces were found: {best.explain()}"
     return Grip(held, best.torques, least.value, closure.margin, float(best.slack.min()))

@@ -11,19 +11,19 @@ from ..arrays import Array
 from ..sim import Gripper, grip
 from .choose import choose
 from .context import Context
-from .motion import ACCELERATION, in_hand
+from .motion import acceleration_of, in_hand
 from .posture import opened, spread
 from .step import Outcome
 
-GRASPS = 80
-"""Grasps that are planned; the arm takes the best that it can carry out."""
+GRASPS, FINGER_GRASPS = 80, 24
+"""Grasps that are planned for jaws and for fingers; the arm takes the best that it can carry out."""
 
 SAME_POSTURE = 0.05
 """Largest change of the supporting planes (unit normal, offset in m) at which planned grasps stay good."""
 
 OPEN_TIME = 3.0
-SAFETY = 1.5
-"""Factor on weight and acceleration that a planned grasp must withstand."""
+SAFETY, FINGER_SAFETY = 1.5, 1.25
+"""Factor on weight and acceleration that a planned grasp must withstand, by jaws and by fingers."""
 
 FORCE_FACTOR = 1.4
 """The grip is this many times what the planner computed to be needed, as far as the hand can press."""
@@ -48,9 +48,10 @@ class PlanGrasp:
         planes = np.array([support_plane(context, T) for T in (context.pose, context.goal)])
         if context.plan is None or np.abs(planes - context.planes).max() > SAME_POSTURE:
             context.tell("searching the surface")
+            wanted, safety = (GRASPS, SAFETY) if context.hand.is_jaw else (FINGER_GRASPS, FINGER_SAFETY)
             context.plan = grasp.plan(
-                context.hand, context.body, GRASPS, rng=context.rng, table=planes, safety=SAFETY,
-                acceleration=ACCELERATION,
+                context.hand, context.body, wanted, rng=context.rng, table=planes, safety=safety,
+                acceleration=acceleration_of(context),
             )  # fmt: skip
             context.planes, context.tried = planes, set()
         plan = context.plan
@@ -65,7 +66,7 @@ class PlanGrasp:
             True,
             f"grasp {context.choice.index + 1} of {len(plan.candidates)}: {best.width * 1e3:.0f} mm wide, "
             f"needs {best.required_force:.1f} N",
-            inputs={"grasps": GRASPS, "body": context.body.name, "hand": context.hand.root},
+            inputs={"grasps": len(plan.candidates), "body": context.body.name, "hand": context.hand.root},
             outputs={
                 "pose": best.pose, "tcp": best.tcp, "width": best.width, "opening": best.opening,
                 "contacts": [c.position for c in best.contacts], "normals": [c.normal for c in best.contacts],

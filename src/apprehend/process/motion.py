@@ -21,7 +21,10 @@ DEFAULT_ACCELERATION = 2.5
 """rad/s² where a description gives no acceleration limit: the slowest of the arms whose limits are published."""
 
 ACCELERATION = 2.0
-"""Largest acceleration in m/s² of a held object; grasps are planned to withstand it in every direction."""
+"""Largest acceleration in m/s² of an object held by a jaw; grasps are planned to withstand it in every direction."""
+
+GENTLE = 1.0
+"""The same for fingers, whose joints are weak."""
 
 SAMPLES = 400
 """Samples of a motion at which it is checked."""
@@ -49,6 +52,11 @@ def limits(context: Context, share: float) -> Limits:
     return Limits(velocity=velocity, acceleration=acceleration * min(1.0, 1.25 * share))
 
 
+def acceleration_of(context: Context) -> float:
+    """Largest acceleration in m/s² of an object in the hand of *context*."""
+    return ACCELERATION if context.hand.is_jaw else GENTLE
+
+
 def gentle(context: Context, motion: Trajectory) -> Trajectory:
     """*motion*, slowed down where it would accelerate the held object by more than the grasp was planned for."""
     if context.held is None:
@@ -60,7 +68,8 @@ def gentle(context: Context, motion: Trajectory) -> Trajectory:
     path = context.robot.fk(q, context.hand.root) @ np.append(com, 1.0)
     acceleration = np.diff(path[:, :3], n=2, axis=0) / (t[1] - t[0]) ** 2
     peak = float(np.linalg.norm(acceleration, axis=1).max())
-    return motion.stretched(np.sqrt(peak / ACCELERATION)) if peak > ACCELERATION else motion
+    allowed = acceleration_of(context)
+    return motion.stretched(np.sqrt(peak / allowed)) if peak > allowed else motion
 
 
 def along_path(context: Context, path: Array, model: CollisionModel, share: float) -> Trajectory:

@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, IntArray, as_vector
+from ..arrays import Array, BoolArray, IntArray, as_vector
 from ..errors import InputError
 from ..result import Result, Status
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 TOUCH = 0.15  # N on a finger that counts as felt
 FEELING_STEPS = 10  # steps in a row in which every finger must feel it, or be at its end
+SMOOTHING = 0.1  # share of the present force in what is felt: fingers chatter when they meet something hard
 RAMP = 0.3  # s from touch to full force, and from full force to none before the fingers open
 GIVE = 0.1  # rad (or 0.1 m of a slide) by which a joint yields to its full effort
 SOFTEST = 0.08  # of the stiffness that one step of the engine could bear
@@ -56,16 +57,17 @@ class CloseStatus(Status):
 
 @dataclass(frozen=True)
 class CloseResult(Result):
-    """Normal forces at the fingers in N, in the order of `Hand.fingers`, and the simulated time of closing in s."""
+    """How many fingers feel the object, their normal forces in N in the order of `Hand.fingers`, and the simulated time
+    of closing in s."""
 
     status: CloseStatus
+    felt: int
     forces: tuple[float, ...]
     time: float
 
     def explain(self) -> str:
         """The outcome with its numbers."""
-        felt = sum(force > 0.0 for force in self.forces)
-        return f"{self.status.value} {felt} of {len(self.forces)} fingers touch, after {self.time:.2f} s."
+        return f"{self.status.value} {self.felt} of {len(self.forces)} fingers touch, after {self.time:.2f} s."
 
 
 class Fingers:
@@ -94,6 +96,7 @@ class Fingers:
         self._others = np.setdiff1d(np.arange(self.coordinates.size), np.concatenate(self.joints))
         self._clock = np.zeros(len(self.joints) + 1)  # of each finger, and of the joints of none
         self._quiet = 0
+        self._feeling = np.zeros(len(self.joints))  # N, smoothed
         self._pressing = np.zeros(self.coordinates.size)
         self._goal = np.zeros(self.coordinates.size)
         self._step = np.zeros(self.coordinates.size)
@@ -113,6 +116,7 @@ class Fingers:
             raise InputError(f"path has {len(points)} points, durations {len(durations)}; expected the same, 1 or more")
         self._plan(world, points, list(durations))
         self._quiet = 0
+        self._feeling[:] = 0.0
         self.state = FingerState.CLOSING
 
     def press(self, torques: ArrayLike, *, ramp: float = RAMP) -> None:
@@ -148,6 +152,12 @@ class Fingers:
         bodies = list(world.plant.bodies.values())
         return tuple(world.table.normal_force(links, bodies) for links in self.links)
 
+    @property
+    def felt(self) -> BoolArray:
+        """Which fingers felt the object when they last closed."""
+        out: BoolArray = self._feeling >= TOUCH
+        return out
+
     # --- control -------------------------------------------------------------------------------------------------
     def torque(self, world: World) -> Array:
         """Torques (n,) of this step."""
@@ -177,7 +187,8 @@ class Fingers:
             return  # let go first
         dt, end = world.timestep, self._times[-1]
         if self.state is FingerState.CLOSING:
-            felt = np.array(self.forces(world)) >= TOUCH
+            self._feeling += SMOOTHING * (np.array(self.forces(world)) - self._feeling)
+            felt = self.felt
             self._clock[:-1] += np.where(felt, 0.0, dt)
             self._clock[-1] += dt
             self._quiet = self._quiet + 1 if (felt | (self._clock[:-1] >= end)).all() else 0
@@ -216,7 +227,6 @@ def close_fingers(
     fingers.close(world, path, durations)
     limit = float(np.sum(durations)) + patience
     over = world.run(limit, *controllers, fingers, until=lambda _: fingers.state is FingerState.CLOSED)
-    forces = fingers.forces(world)
-    felt = sum(force > 0.0 for force in forces)
+    felt = int(fingers.felt.sum())
     status = (CloseStatus.EMPTY, CloseStatus.ONE_SIDED, CloseStatus.SUCCESS)[min(felt, 2)]
-    return CloseResult(status if over else CloseStatus.TIMEOUT, forces, world.time - start)
+    return CloseResult(status if over else CloseStatus.TIMEOUT, felt, fingers.forces(world), world.time - start)

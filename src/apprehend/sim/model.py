@@ -168,6 +168,7 @@ def _add_robot(spec: Any, robot: Robot, physics: Physics) -> list[str]:
     _add_link(spec, root, description, description.root, assumptions)
     bodies = {description.root: root}
     massive, carriers = _massive_groups(description)
+    drives: dict[str, list[str]] = {}  # what is assumed of drives → of which joints
     for joint in description.joints:
         body = bodies[joint.parent].add_body(name=f"link:{joint.child}")
         shapes.place(body, joint.pose)
@@ -176,9 +177,8 @@ def _add_robot(spec: Any, robot: Robot, physics: Physics) -> list[str]:
         if joint.type is JointType.FIXED:
             continue
         _add_joint(body, joint, physics)
-        assumptions += [sentence] if (sentence := losses(joint)[2]) else []
-        if not joint.armature and _rotor(joint):
-            assumptions.append(f"joint {joint.name} states no rotor inertia; {_rotor(joint):.2g} kg m² are assumed")
+        for sentence in _drive(joint):
+            drives.setdefault(sentence, []).append(joint.name)
         if joint.child in massive:
             continue
         carries = joint.child in carriers
@@ -187,6 +187,7 @@ def _add_robot(spec: Any, robot: Robot, physics: Physics) -> list[str]:
         body.inertia = [body.mass * 0.01**2] * 3
         if not carries:
             assumptions.append(f"link {joint.child} moves and has no mass; {MASSLESS * 1e3:g} g is assumed")
+    assumptions += [f"joint {', '.join(names)}: {sentence}" for sentence, names in drives.items()]
     for joint in description.joints:
         if joint.mimic is not None and joint.type is not JointType.FIXED:
             coupling = spec.add_equality(
@@ -263,6 +264,14 @@ def _add_joint(body: Any, joint: Joint, physics: Physics) -> None:
         made.solimp_limit = physics.joint_solimp
 
 
+def _drive(joint: Joint) -> list[str]:
+    """What is assumed of the drive of a joint, a sentence each."""
+    said = [sentence] if (sentence := losses(joint)[2]) else []
+    if not joint.armature and _rotor(joint):
+        said.append(f"no rotor inertia is stated; {_rotor(joint):.2g} kg m² are assumed")
+    return said
+
+
 def losses(joint: Joint) -> tuple[float, float, str | None]:
     """Dry friction and damping of a joint, and a sentence where those of the file would stop its own drive.
 
@@ -278,14 +287,11 @@ def losses(joint: Joint) -> tuple[float, float, str | None]:
         damping = LOSSES * effort / speed
     if (friction, damping) == (joint.friction, joint.damping):
         return friction, damping, None
-    return (
-        friction,
-        damping,
-        (
-            f"joint {joint.name} could not move against its dry friction of {joint.friction:.3g} and damping of "
-            f"{joint.damping:.3g} with its effort of {effort:.3g}; {friction:.2g} and {damping:.2g} are assumed"
-        ),
+    said = (
+        f"an effort of {effort:.3g} could not move it against its dry friction of {joint.friction:.3g} and damping of "
+        f"{joint.damping:.3g}; {friction:.2g} and {damping:.2g} are assumed"
     )
+    return friction, damping, said
 
 
 def _rotor(joint: Joint) -> float:
