@@ -22,8 +22,15 @@ ROTATION_TOLERANCE = 1e-6
 """Largest entry of ``R.T @ R - 1`` that still counts as a rotation given with rounded digits."""
 
 
+def is_complex(value: Any) -> bool:
+    """Whether an array holds complex numbers, whose imaginary part NumPy would drop with a warning."""
+    return getattr(getattr(value, "dtype", None), "kind", "") == "c"
+
+
 def as_array(value: ArrayLike, name: str, *, finite: bool = True) -> Array:
     """*value* as a C-contiguous float64 array; NaN and inf are refused unless *finite* is False."""
+    if is_complex(value):
+        raise InputError(f"{name} is complex; expected real numbers")
     try:
         array = np.asarray(value, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
@@ -34,6 +41,17 @@ def as_array(value: ArrayLike, name: str, *, finite: bool = True) -> Array:
         bad = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{name}{list(bad) if bad else ''} is {array[bad]}; every entry must be finite")
     return array
+
+
+def as_own(value: ArrayLike, name: str, *, finite: bool = True) -> Array:
+    """As `as_array`, but never the caller's own memory: for values that are kept."""
+    array = as_array(value, name, finite=finite)
+    return array.copy() if isinstance(value, np.ndarray) and np.may_share_memory(array, value) else array
+
+
+def spread(array: Array, shape: tuple[int, ...]) -> Array:
+    """*array* broadcast to *shape*, contiguous and writable, so that kernels meet one type; itself if it has it."""
+    return array if array.shape == shape else np.array(np.broadcast_to(array, shape), order="C")
 
 
 def as_shaped(value: ArrayLike, name: str, *tail: int, finite: bool = True) -> Array:

@@ -47,10 +47,10 @@ def suggestion(name: str, known: Iterable[str], limit: int = 3) -> str:
     return f" Did you mean {' or '.join(repr(c) for c in close)}?" if close else ""
 
 
-def unknown_name(kind: str, name: str, known: Iterable[str], where: str = "") -> Never:
+def unknown_name(kind: str, name: object, known: Iterable[str], where: str = "") -> Never:
     """Raise `UnknownNameError` for *name*, listing what is close, or everything that is there."""
     names = sorted(known)
-    hint = suggestion(name, names)
+    hint = suggestion(name, names) if isinstance(name, str) else ""
     if not hint:
         shown = ", ".join(names[:12]) + (f", … ({len(names)} in all)" if len(names) > 12 else "")
         hint = f" There are: {shown}." if names else " There are none."

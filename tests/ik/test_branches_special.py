@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from apprehend import ik
-from apprehend.errors import UnsuccessfulError
+from apprehend.errors import InputError, UnsuccessfulError
 from apprehend.ik import BranchStatus
+from apprehend.kernels.ik_refine import finish
+from apprehend.kernels.ik_seeds import chain_targets
 from apprehend.kinematics import Robot
 
 from .makers import configurations, from_axes, from_dh
@@ -87,3 +89,20 @@ def test_a_batch_without_full_success_can_be_required() -> None:
     assert ik.branches(robot, np.stack([near, near])).require_success().success.all()
     with pytest.raises(UnsuccessfulError, match="1 of 2 targets have branches"):
         ik.branches(robot, np.stack([near, far])).require_success()
+
+
+def test_targets_and_q0_broadcast_and_kernels_meet_one_type() -> None:
+    robot = from_axes(*UR)
+    T, q0 = robot.fk(np.full(6, 0.3), "tip"), np.zeros(6)
+    for poses, near, shape in (
+        (T, q0, ()), (T, q0[None], (1,)), (T, np.zeros((3, 6)), (3,)), (np.stack([T, T])[:, None], q0[None], (2, 1)),
+    ):  # fmt: skip
+        assert ik.branches(robot, poses, "tip", q0=near).codes.shape == shape
+        assert ik.solve(robot, poses, "tip", near).codes.shape == shape
+    assert len(finish.signatures) == len(chain_targets.signatures) == 1
+    with pytest.raises(InputError, match=r"q0 has batch shape \(3,\) and T \(2,\); they do not broadcast"):
+        ik.branches(robot, np.stack([T, T]), "tip", q0=np.zeros((3, 6)))
+    with pytest.raises(InputError, match=r"q0 has batch shape \(3,\) and T \(2,\)"):
+        ik.solve_frames(robot, np.stack([[T, T], [T, T]]), ["tip", "link2"], q0=np.zeros((3, 6)))
+    with pytest.raises(InputError, match=r"velocity has shape \(3, 6\); expected \(6,\), as q"):
+        ik.step(robot, q0, [ik.PoseTask("tip", T)], 0.01, velocity=np.zeros((3, 6)))

@@ -31,7 +31,7 @@ class Alone:
     """A robot's links, and which of them may touch: what all its models share, whatever else there is."""
 
     def __init__(self, tree: TreeModel, nodes: tuple[Node, ...], allowed: Collection[Pair]) -> None:
-        self.tree, self.nodes, self.allowed = tree, nodes, allowed
+        self.tree, self.nodes, self.allowed = tree, nodes, frozenset(allowed)
         m = len(tree.kind)
         self.links = np.stack([tree.parent, tree.kind, tree.coordinate], axis=1)
         self.joints = np.concatenate([tree.place, tree.gain], axis=1)
@@ -46,7 +46,7 @@ class Alone:
     def allowing(self, allowed: Collection[Pair]) -> Alone:
         """The same links, of which others may touch."""
         other = object.__new__(type(self))
-        other.__dict__.update({k: v for k, v in self.__dict__.items() if k != "blocks"}, allowed=allowed)
+        other.__dict__.update({k: v for k, v in self.__dict__.items() if k != "blocks"}, allowed=frozenset(allowed))
         return other
 
     def node_rows(self, nodes: Sequence[Node]) -> Array:

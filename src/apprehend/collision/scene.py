@@ -184,6 +184,14 @@ class Scene:
         object.__setattr__(self, "obstacles", MappingProxyType(dict(self.obstacles)))
         object.__setattr__(self, "allowed", tuple((str(a), str(b)) for a, b in self.allowed))
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {n: dict(v) if isinstance(v, MappingProxyType) else v for n, v in vars(self).items()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            proxy = name in ("bodies", "goals", "obstacles")
+            object.__setattr__(self, name, MappingProxyType(value) if proxy else value)
+
     # --- changes, each a new scene -------------------------------------------------------------------------------
     def moved(self, name: str, pose: ArrayLike) -> Scene:
         """The scene with body *name* at *pose* (4, 4)."""

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, as_array
+from ..arrays import Array, as_array, as_own
 from ..errors import InputError
 
 
@@ -49,7 +49,7 @@ class Contact:
     tangent: Array | None = None
 
     def __post_init__(self) -> None:
-        p, n = as_array(self.position, "contact position"), as_array(self.normal, "contact normal")
+        p, n = as_own(self.position, "contact position"), as_array(self.normal, "contact normal")
         if p.shape not in ((2,), (3,)) or n.shape != p.shape:
             raise InputError(
                 f"contact position has shape {p.shape} and normal {n.shape}; "
@@ -69,7 +69,7 @@ class Contact:
         object.__setattr__(self, "friction", float(self.friction))
         object.__setattr__(self, "torsion", float(self.torsion))
         if self.tangent is not None and len(p) == 3:
-            t = as_array(self.tangent, "contact tangent")
+            t = as_own(self.tangent, "contact tangent")
             if t.shape != (3,) or abs(float(t @ n)) > 1e-6 or abs(float(np.linalg.norm(t)) - 1.0) > 1e-6:
                 raise InputError(
                     f"contact tangent {t.tolist()} must be a unit vector square to the normal {n.tolist()}"

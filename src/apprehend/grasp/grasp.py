@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, as_array, as_shaped
+from ..arrays import Array, as_own, as_shaped
 from ..bodies import Body
 from ..errors import InputError
 from ..kernels.hull_support import BOX, SAME
@@ -69,7 +69,7 @@ class Grasp:
         self.body = body
         if reference is None:
             reference = body.com if body is not None and self.dimension == 3 else np.zeros(self.dimension)
-        self.reference = as_array(reference, "reference")
+        self.reference = as_own(reference, "reference")
         if self.reference.shape != (self.dimension,):
             raise InputError(f"reference has shape {self.reference.shape}; expected ({self.dimension},)")
         self.length = float(length if length is not None else body.radius if body is not None else 1.0)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, as_array, choice
+from ..arrays import Array, as_array, as_own, choice
 from ..errors import InputError
 from .contact import Contact, ContactModel
 
@@ -36,7 +36,7 @@ class Patch:
     friction: float = 0.6
 
     def __post_init__(self) -> None:
-        corners = as_array(self.corners, "patch corners")
+        corners = as_own(self.corners, "patch corners")
         if corners.ndim != 2 or corners.shape[1] not in (2, 3) or len(corners) < corners.shape[1]:
             raise InputError(
                 f"patch corners have shape {corners.shape}; expected (V, 3) with three or more, in the plane (2, 2)"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, BoolArray, IntArray, as_array, as_shaped
+from ..arrays import Array, BoolArray, IntArray, as_array, as_shaped, spread
 from ..errors import InputError, MeshError
 from ..kernels import rays
 from ..parallel import over_ranges
@@ -54,7 +54,7 @@ class Surface:
     ) -> Crossings:
         """Every crossing of the rays ``origins (N, 3)``, ``directions (N, 3)`` with ``low <= t <= high``."""
         o = as_shaped(origins, "origins", 3).reshape(-1, 3)
-        d = np.ascontiguousarray(np.broadcast_to(as_shaped(directions, "directions", 3), o.shape))
+        d = spread(as_shaped(directions, "directions", 3), o.shape)
         if not (d != 0.0).any(axis=1).all():
             raise InputError("a ray direction is zero; every direction needs a length")
         n = len(o)

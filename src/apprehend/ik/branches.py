@@ -20,7 +20,7 @@ from ..kernels.ik_refine import finish
 from ..kinematics import Robot
 from ..parallel import over_ranges
 from ..result import Result, Status
-from .chain import PreparedChain, prepare
+from .chain import PreparedChain, prepare, read_targets
 from .continua import self_motions, within_limits
 from .flat import flat_branches, flat_structure
 from .general import first_pair, general_branches
@@ -187,17 +187,12 @@ def branches(
     With *limits* only branches within the position limits are returned, on the turn nearest to *q0* ``(..., n)`` or to
     the middle of the limits; else all, in (−π, π]. Coordinates that do not move the frame keep *q0* or home.
     """
-    T = as_pose(T, "T")
     frame = tip_of(robot) if frame is None else frame
     arm = _arm(robot, frame)
-    shape = T.shape[:-2]
-    count = math.prod(shape)
-    poses = np.ascontiguousarray(T).reshape(count, 4, 4)
+    poses, fill, shape = read_targets(robot, as_pose(T, "T"), q0)
     if q0 is None:
         fill, near = robot.home[None], arm.chain.middle[None]
     else:
-        fill = np.ascontiguousarray(np.broadcast_to(as_shaped(q0, "q0", robot.n), (*shape, robot.n)))
-        fill = fill.reshape(count, robot.n)
         near = np.ascontiguousarray(fill[:, arm.chain.free])
     model = robot.chain_model(frame)
     if arm.locked >= 0:

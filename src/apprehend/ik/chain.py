@@ -9,8 +9,9 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, as_shaped, spread
 from ..errors import InputError
 from ..kernels.chain import PRISMATIC, ChainModel
 from ..kernels.ik_chain import IKChain
@@ -188,3 +189,18 @@ def _box(lower: Array, upper: Array, sliding: Any, turns: Any, length: float) ->
     )
     high = np.where(turns, math.pi, np.where(np.isfinite(upper), upper, low + 2.0 * span))
     return low, high
+
+
+def read_targets(robot: Robot, T: Array, q0: ArrayLike | None) -> tuple[Array, Array, tuple[int, ...]]:
+    """Poses ``(N, 4, 4)``, joint vectors ``(N, n)`` to fill up with, and the batch shape."""
+    shape = T.shape[:-2]
+    start = robot.home
+    if q0 is not None:
+        start = as_shaped(q0, "q0", robot.n)
+        try:
+            shape = np.broadcast_shapes(shape, start.shape[:-1])
+        except ValueError as error:
+            raise InputError(f"q0 has batch shape {start.shape[:-1]} and T {shape}; they do not broadcast") from error
+    count = math.prod(shape)
+    T, start = spread(T, (*shape, 4, 4)), spread(start, (*shape, robot.n))
+    return T.reshape(count, 4, 4), start.reshape(count, robot.n), shape

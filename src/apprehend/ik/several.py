@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import IntArray, as_array, as_pose, as_shaped
+from ..arrays import IntArray, as_array, as_pose, as_shaped, spread
 from ..errors import InputError
 from ..kinematics import Robot
 from .chain import prepare
@@ -98,7 +98,7 @@ def _read(
         raise InputError(f"tolerance has shape {box.shape}; expected a number, (6,) or ({F}, 6)")
     if not (box > 0.0).all():
         raise InputError("every entry of tolerance must be positive (inf: the axis is free)")
-    box = np.broadcast_to(box, (F, 6))
+    box = spread(box, (F, 6))
     if not np.isfinite(box).any(axis=1).all():
         at = int(np.flatnonzero(~np.isfinite(box).any(axis=1))[0])
         raise InputError(f"tolerance of frame {frames[at]!r} is inf in all axes: nothing is asked of it; leave it out")
@@ -106,8 +106,11 @@ def _read(
     shape = T.shape[:-3]
     count = math.prod(shape)
     poses = np.ascontiguousarray(T.reshape(count, F, 4, 4))
-    start = np.broadcast_to(robot.home if q0 is None else as_shaped(q0, "q0", robot.n), (*shape, robot.n))
-    start = start.reshape(count, robot.n)
+    start = robot.home if q0 is None else as_shaped(q0, "q0", robot.n)
+    try:
+        start = spread(start, (*shape, robot.n)).reshape(count, robot.n)
+    except ValueError:
+        raise InputError(f"q0 has batch shape {start.shape[:-1]} and T {shape}; they do not broadcast") from None
     moving = np.zeros(robot.n, dtype=bool)
     joined = start.copy()
     for i, (frame, chain) in enumerate(zip(frames, chains, strict=True)):

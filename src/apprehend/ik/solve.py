@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, BoolArray, IntArray, as_array, as_pose, as_shaped, as_vector
+from ..arrays import Array, BoolArray, IntArray, as_array, as_pose, as_vector
 from ..errors import InputError
 from ..kernels.chain import chain_poses
 from ..kernels.ik_seeds import residuals
 from ..kinematics import Robot
 from ..parallel import over_ranges
-from .chain import PreparedChain, prepare
+from .chain import PreparedChain, prepare, read_targets
 from .diagnose import diagnose as diagnose_failures
 from .queue import Request, run, seed_of, whole
 from .result import IKResult, IKStatus
@@ -83,8 +82,8 @@ def solve(
             robot, T, frame, q0, tolerance=tolerance, n_solutions=max(CHOICE, n_solutions), distinct=distinct,
             max_starts=max_starts, accept=accept, diagnose=diagnose, rng=rng,
         )  # fmt: skip
-        return _preferred(robot, more, _batch(robot, as_pose(T, "T"), q0)[0], prefer, n_solutions)
-    poses, fill, shape = _batch(robot, as_pose(T, "T"), q0)
+        return _preferred(robot, more, read_targets(robot, as_pose(T, "T"), q0)[0], prefer, n_solutions)
+    poses, fill, shape = read_targets(robot, as_pose(T, "T"), q0)
     chain = prepare(robot, frame)
     box, partial, free_axis = _tolerance(tolerance, chain.reach)
     seed = seed_of(rng)
@@ -170,24 +169,6 @@ class _Problem:
             near=near,
             guesses=guesses,
         )
-
-
-def _batch(robot: Robot, T: Array, q0: ArrayLike | None) -> tuple[Array, Array, tuple[int, ...]]:
-    """Poses ``(N, 4, 4)``, joint vectors ``(N, n)`` to fill up with, and the batch shape."""
-    shape = T.shape[:-2]
-    start = robot.home
-    if q0 is not None:
-        start = as_shaped(q0, "q0", robot.n)
-        try:
-            shape = np.broadcast_shapes(shape, start.shape[:-1])
-        except ValueError as error:
-            raise InputError(f"q0 has batch shape {start.shape[:-1]} and T {shape}; they do not broadcast") from error
-    count = math.prod(shape)
-    if T.shape[:-2] != shape:
-        T = np.ascontiguousarray(np.broadcast_to(T, (*shape, 4, 4)))
-    if start.shape[:-1] != shape:
-        start = np.broadcast_to(start, (*shape, robot.n))
-    return T.reshape(count, 4, 4), start.reshape(count, robot.n), shape
 
 
 def _search(problem: _Problem, accept: Accept | None) -> tuple[Array, IntArray, IntArray, IntArray, BoolArray]:

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, IntArray, as_array, as_pose, as_shaped
+from ..arrays import Array, IntArray, as_array, as_pose, as_shaped, spread
 from ..errors import InputError
 from ..kernels.ik_faults import OUTSIDE
 from ..kernels.ik_step import steps
@@ -137,12 +137,15 @@ def _advance(robot: Robot, levels: Levels, program: Program, q: ArrayLike, veloc
              damping: float) -> Array:  # fmt: skip
     """The step from q."""
     rows, shape = _joint_vectors(robot, q)
-    limits = robot.limits
+    limits = robot.limits_model
     before, acceleration = rows, np.full(robot.n, np.inf)
     if velocity is not None:
         acceleration = limits.acceleration
-        before = np.ascontiguousarray(np.broadcast_to(as_shaped(velocity, "velocity", robot.n), shape))
-        before = before.reshape(-1, robot.n)
+        given = as_shaped(velocity, "velocity", robot.n)
+        try:
+            before = spread(given, shape).reshape(-1, robot.n)
+        except ValueError:
+            raise InputError(f"velocity has shape {given.shape}; expected {shape}, as q") from None
     out = np.empty(rows.shape)
     fault = np.zeros(1, dtype=np.int64)
     model, structure = robot.model, program.structure
@@ -203,7 +206,7 @@ class Stepper:
     def __init__(self, robot: Robot, tasks: Levels, dt: float, *, damping: float = 1e-3) -> None:
         self.robot = robot
         self.dt, self._damping = _settings(dt, damping)
-        self._levels = [list(_members(level)) for level in _listed(tasks)]
+        self._levels = [[task._held() for task in _members(level)] for level in _listed(tasks)]
         structure_of(robot, self._levels)
         self._depends = any(isinstance(t, DescentTask) for level in self._levels for t in level)
         self._program: Program | None = None
@@ -215,7 +218,7 @@ class Stepper:
             kinds = ", ".join(type(level[i]).__name__ for level, i in places)
             raise InputError(f"task {number} cannot become a {type(task).__name__}; the tasks are {kinds}")
         level, i = places[number]
-        level[i] = task
+        level[i] = task._held()
         self._program = None
 
     def __call__(self, q: ArrayLike, velocity: ArrayLike | None = None) -> Array:

@@ -7,8 +7,9 @@ row; a weight of zero leaves a row out (a partial pose).
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from copy import copy
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,6 +47,14 @@ class Task:
     def _key(self) -> Hashable:
         """All that `_rows` depends on: tasks with equal keys differ in their targets only."""
         raise NotImplementedError
+
+    def _held(self) -> Self:
+        """The task with arrays of its own, which the caller does not change any more."""
+        own = copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                object.__setattr__(own, name, value.copy())
+        return own
 
     def _rows(self, robot: Robot) -> Rows:
         """The task for *robot*, checked."""

@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, as_pose, as_shaped, choice
+from ..arrays import Array, as_pose, as_shaped, choice, is_complex
 from ..errors import InputError, unknown_name
 from ..kernels import chain as chain_kernels
 from ..kernels import single as single_kernels
@@ -77,6 +77,7 @@ class Robot:
         self.description = description
         self.name = description.name
         self.base = np.eye(4) if base is None else as_pose(base, "base").copy()
+        self.base.flags.writeable = False
         if self.base.shape != (4, 4):
             raise InputError(f"base has shape {self.base.shape}; expected (4, 4)")
         self.model = tree_model(description, self.base)
@@ -143,7 +144,16 @@ class Robot:
 
     @cached_property
     def limits(self) -> Limits:
-        """Limits of the coordinates."""
+        """Limits of the coordinates; read-only, as all of a robot: `Limits` of a trajectory, or a description with
+        other `JointLimits`, say what else should hold."""
+        read_only = {name: array.view() for name, array in vars(self.limits_model).items()}
+        for array in read_only.values():
+            array.flags.writeable = False
+        return Limits(**read_only)
+
+    @cached_property
+    def limits_model(self) -> Limits:
+        """The limits as kernels read them, in writable memory: not to be written to."""
         of = [joint.limits for joint in self.description.free_joints]
         continuous = np.array([j.type is JointType.CONTINUOUS for j in self.description.free_joints], dtype=bool)
         return Limits(
@@ -154,11 +164,15 @@ class Robot:
             effort=np.array([limit.effort for limit in of], dtype=np.float64),
         )
 
-    @cached_property
+    @property
     def home(self) -> Array:
         """A resting joint vector ``(n,)``: the description's value for a joint where it gives one; else the middle
-        of its limits where both are finite; else zero, or the limit nearest to zero.
+        of its limits where both are finite; else zero, or the limit nearest to zero. A new array each time.
         """
+        return self._home.copy()
+
+    @cached_property
+    def _home(self) -> Array:
         values = [self._home_of(joint) for joint in self.description.free_joints]
         return np.array(values, dtype=np.float64)
 
@@ -329,8 +343,10 @@ class Robot:
         """*value* as writable contiguous float64 ``(..., n)``, so that kernels meet one type; not checked for NaN."""
         try:
             array = np.asarray(value, dtype=np.float64, order="C")
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, np.exceptions.ComplexWarning):
             return as_shaped(value, name, self.n)
+        if array is not value and is_complex(value):
+            as_shaped(value, name, self.n)
         if not array.ndim or array.shape[-1] != self.n:
             joints = ", ".join(self.joint_names[:8]) + (", …" if self.n > 8 else "")
             raise InputError(f"{name} has shape {array.shape}; expected (..., {self.n}) for the joints {joints}")

@@ -187,7 +187,7 @@ class _Follower:
     def __init__(self, robot: Robot, frame: str, line: Helix, deviation: float, rotation: float) -> None:
         self.robot, self.frame, self.line = robot, frame, line
         self.model = robot.chain_model(frame)
-        self.lower, self.upper = (np.ascontiguousarray(x) for x in (robot.limits.lower, robot.limits.upper))
+        self.lower, self.upper = robot.limits_model.lower, robot.limits_model.upper
         # what numerical tolerance the points themselves have is taken off the tube
         self.bounds = deviation - 2.0 * TOLERANCE, rotation - 2.0 * TOLERANCE
         self.rows = 6 if np.isfinite(rotation) else 3

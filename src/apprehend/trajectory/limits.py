@@ -15,7 +15,7 @@ from ..result import Result, Status
 _ORDERS = ("position", "velocity", "acceleration", "jerk")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Limits:
     """Bounds on the derivatives of every coordinate; ``None`` leaves one out.
 
@@ -27,6 +27,12 @@ class Limits:
     acceleration: ArrayLike | None = None
     jerk: ArrayLike | None = None
     position: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        for name in _ORDERS:
+            value = getattr(self, name)
+            if isinstance(value, np.ndarray):  # the caller's own memory may change
+                object.__setattr__(self, name, value.copy())
 
     @classmethod
     def read(cls, source: Any) -> Limits:

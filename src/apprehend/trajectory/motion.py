@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array
+from ..arrays import Array, as_own
 from ..errors import InputError
 from .limits import _ORDERS, LimitReport, Limits, LimitStatus
 from .piecewise import Piecewise
@@ -159,7 +159,7 @@ def concatenate(motions: Iterable[Trajectory], tolerance: float = 1e-6) -> Traje
 
 def pause(position: ArrayLike, duration: float) -> Trajectory:
     """Standing still at *position* ``(n,)`` for *duration* seconds."""
-    position = np.atleast_1d(np.asarray(position, dtype=np.float64))
+    position = np.atleast_1d(as_own(position, "position"))
     if not duration > 0.0:
         raise InputError(f"duration is {duration}; expected a positive time in seconds")
     return Trajectory([0.0, duration], position[None, None, :])

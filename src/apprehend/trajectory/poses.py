@@ -148,6 +148,8 @@ class PoseSpline:
         if knots is None:
             angles = np.linalg.norm(so3.log(np.swapaxes(T[:-1, :3, :3], 1, 2) @ T[1:, :3, :3]), axis=-1)
             steps = np.concatenate([np.diff(T[:, :3, 3], axis=0), radian * angles[:, None]], axis=1)
+            if not steps.any():
+                raise InputError(f"all {len(T)} poses coincide; a path needs at least two different ones")
             knots = chord_knots(np.concatenate([np.zeros((1, 4)), np.cumsum(np.abs(steps), axis=0)]))
         self.poses = T
         self.knots = as_array(knots, "knots")
@@ -184,4 +186,4 @@ def _two(T0: ArrayLike, T1: ArrayLike) -> tuple[Array, Array]:
     for name, T in (("T0", start), ("T1", end)):
         if T.shape != (4, 4):
             raise InputError(f"{name} has shape {T.shape}; expected one (4, 4) pose")
-    return start, end
+    return start.copy(), end.copy()
