@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, as_shaped, choice
-from ..bodies import Boxes, Capsules, ConvexPieces, Deviation, MeshIndex, Spheres, SurfaceMesh, Wireframe
 from ..errors import InputError
 from ..robots.description import Description, Link, Shape, ShapeKind
 from ..robots.meshes import link_surface
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # robots are read far more often than modelled, so functions import what they need
+    from ..bodies import Boxes, Capsules, ConvexPieces, Deviation, MeshIndex, Spheres, SurfaceMesh, Wireframe
     from .robot import Robot
+
+    LinkModel = Boxes | Capsules | ConvexPieces | Spheres | SurfaceMesh | Wireframe
 
 KINDS = ("surface", "simplified", "wireframe", "blocks", "boxes", "spheres", "capsules", "convex")
 """Models that a link can have; blocks are boxes along the axes of the link."""
@@ -28,8 +30,6 @@ COUNTS = {"simplified": 500, "blocks": 1, "boxes": 1, "spheres": 16, "capsules":
 
 ROUND = 1.01
 """Round shapes are known as polyhedra within them; grown by this factor the polyhedra contain the shapes."""
-
-LinkModel = Boxes | Capsules | ConvexPieces | Spheres | SurfaceMesh | Wireframe
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +101,8 @@ def link_models(robot: Robot, kind: str = "capsules", count: int | None = None, 
     Boxes, spheres and capsules enclose the link's collision shapes (or what is seen of it, if *visual*); convex pieces
     cover them nearly. `LinkModels.deviations` says what each adds or misses.
     """
+    from ..bodies import MeshIndex
+
     choice(kind, "kind", KINDS)
     if count is not None and not 1 <= count <= 100_000:
         raise InputError(f"count is {count}; expected 1 or more shapes per link")
@@ -132,6 +134,7 @@ def _grown(link: Link) -> Link:
 
 
 def _model(kind: str, count: int, surface: MeshIndex, grown: MeshIndex) -> LinkModel:
+    from ..bodies import Boxes, Capsules, ConvexPieces, Spheres, SurfaceMesh, Wireframe
     from ..bodies.convex import decompose
     from ..bodies.surface_mesh import thinned
 
@@ -152,6 +155,8 @@ def _model(kind: str, count: int, surface: MeshIndex, grown: MeshIndex) -> LinkM
 
 def _shapes(model: Any) -> list[Shape]:
     """The shapes of a model as they stand in a description."""
+    from ..bodies import Boxes, Spheres
+
     if isinstance(model, Boxes):
         return [Shape(ShapeKind.BOX, tuple(map(float, s)), p.copy()) for p, s in zip(model.poses, model.sizes)]
     if isinstance(model, Spheres):
