@@ -58,12 +58,13 @@ def _covered(first: IntArray, last: IntArray, count: IntArray) -> NDArray[np.boo
 
     A box adds one to all cells beyond its first corner, and takes it away beyond its others: sums along the axes.
     """
-    steps = np.zeros(tuple(count + 1), np.int32)
+    steps = np.zeros(tuple(count + 1), np.int64)
     a, b = first - 1, last + 2
     for corner in range(8):
         side = [(corner >> axis) & 1 for axis in range(3)]
-        place = tuple(np.where(side, b, a).T)
-        np.add.at(steps, place, 1 - 2 * (sum(side) % 2))
+        place = np.ravel_multi_index(tuple(np.where(side, b, a).T), steps.shape)
+        many = np.bincount(place, minlength=steps.size).reshape(steps.shape)
+        steps += -many if sum(side) % 2 else many
     for axis in range(3):
         np.cumsum(steps, axis=axis, out=steps)
     covered: NDArray[np.bool_] = steps[:-1, :-1, :-1] > 0

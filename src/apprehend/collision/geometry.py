@@ -210,15 +210,23 @@ def join_rows(rows: Sequence[Rows], leaves: Sequence[int]) -> Rows:
     """Rows one after the other; *leaves* says how many shapes of unions belong to each."""
     if len(rows) < 2:
         return rows[0] if rows else NOTHING
-    out = Rows(*(joined(arrays) for arrays in zip(*rows, strict=True)))
+    out = Rows(
+        np.concatenate([r.ints for r in rows]),
+        np.concatenate([r.floats for r in rows]),
+        np.concatenate([r.points for r in rows]),
+        np.concatenate([r.ends for r in rows]),
+        np.concatenate([r.around for r in rows]),
+        joined([r.trees for r in rows]),
+        joined([r.values for r in rows]),
+    )
     sizes = np.array([(len(r.points), len(r.values), n, len(r.trees), len(r.around)) for r, n in zip(rows, leaves)])
     before = np.cumsum(sizes, axis=0) - sizes
     place = np.repeat(before, [len(r.ints) for r in rows], axis=0)
-    ints, floats, kind = np.array(out.ints), np.array(out.floats), out.ints[:, 0]
-    ints[:, 1] += place[np.arange(len(kind)), PLACES[kind]]
-    floats[:, 0] += np.where(kind >= CLOUD, place[:, 3], 0)
-    ends = out.ends + np.repeat(before[:, 4], sizes[:, 0])
-    return out._replace(ints=ints, floats=floats, ends=ends)
+    kind = out.ints[:, 0]
+    out.ints[:, 1] += place[np.arange(len(kind)), PLACES[kind]]
+    out.floats[:, 0] += np.where(kind >= CLOUD, place[:, 3], 0)
+    np.add(out.ends, np.repeat(before[:, 4], sizes[:, 0]), out=out.ends)
+    return out
 
 
 PLACES = np.array([1 if kind == FIELD else 2 if kind == TREE else 0 for kind in range(TREE + 1)])
@@ -234,7 +242,8 @@ def joined(arrays: Sequence[AnyArray]) -> AnyArray:
 def join(parts: Sequence[Part]) -> Part:
     """Parts one after the other."""
     rows = join_rows([p.rows for p in parts], [len(p.leaves.ints) for p in parts])
-    return Part(rows, join_rows([p.leaves for p in parts], [0] * len(parts)))
+    leaves = [p.leaves for p in parts if len(p.leaves.ints)]
+    return Part(rows, join_rows(leaves, [0] * len(leaves)))
 
 
 def arrays_of(part: Part) -> Shapes:

@@ -123,12 +123,14 @@ class Convex(Geometry):
     def graph(self) -> tuple[IntArray, IntArray]:
         """Neighbours of the vertices of a hull: where those of each vertex end, and all of them, ascending."""
         count = len(self.points)
+        if not count:
+            return super().graph
         if len(self.faces):
             i, j = self.faces[:, [0, 1, 2, 1, 2, 0]], self.faces[:, [1, 2, 0, 0, 1, 2]]
             pairs = np.unique(i * count + j)
         else:  # a flat set: everything is near everything
             pairs = np.flatnonzero(~np.eye(count, dtype=bool))
-        return np.cumsum(np.bincount(pairs // max(count, 1), minlength=count)), pairs % max(count, 1)
+        return np.cumsum(np.bincount(pairs // count, minlength=count)), pairs % count
 
 
 def _box_frame(points: Array) -> tuple[Array, Array]:
