@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import kernel
-from .lanes import LANES
+from .lanes import LANES, fma
 from .sphere_near import BOX, CYLINDER, at, mark_near, near, near_node, to_box, to_cylinder, to_grid, to_spheres
-from .vector import floor, load, select, some, store
+from .vector import floor, load, select, some, splat, store
 
 WHOLE_TURNS = 1e4  # joint values above this, in rad, are left to the exact check: lanes reduce angles to 1e5 only
 
@@ -79,9 +79,9 @@ def sphere_space(model, n):
 def sine_cosine(x):
     """As `lanes.sincos`, of sixteen angles in registers."""
     k = floor(x * 0.6366197723675814 + 0.5)
-    r = x - k * 1.5707963267341256
-    r = r - k * 6.077100506303966e-11
-    r = r - k * 2.0222662487959506e-21
+    r = fma(-k, splat(1.5707963267341256), x)
+    r = fma(-k, splat(6.077100506303966e-11), r)
+    r = fma(-k, splat(2.0222662487959506e-21), r)
     z = r * r
     s = z * 1.58969099521155010221e-10 + -2.50507602534068634195e-08
     s = s * z + 2.75573137070700676789e-06
