@@ -112,7 +112,8 @@ def construction() -> None:
 
 
 def main() -> None:
-    CollisionModel(Robot.load("schunk_egk40")).add("box", [Convex.box([0.1, 0.1, 0.1])]).free(np.zeros(2))
+    some = Robot.load("ur3e")  # kernels are loaded, and SciPy
+    CollisionModel(some).add("box", [Convex.box([0.1, 0.1, 0.1])]).free(some.home)
     construction()
     panda = Robot.load("panda")
     for threads in (1, 2):
