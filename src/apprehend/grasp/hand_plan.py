@@ -23,7 +23,7 @@ from .surface import Surface
 
 BATCH = 96
 """Hands that are placed at once."""
-ENOUGH, MORE = 4, 3
+ENOUGH, MORE = 4, 2
 """With fewer grasps than ENOUGH up to MORE times as many are tried."""
 PLACES = 16000
 """Placements of pre-grasps from which the inverse way chooses its contacts; of thrice as many if not all are wanted."""

@@ -3,12 +3,14 @@
 from .context import Context
 from .episode import Episode, EpisodeStatus, StepRecord, StepStatus, Verdict, read_episode
 from .fine import Refine
+from .fingers import CloseFingers, RateFingers
 from .locate import Locate, LocateByState
 from .pipeline import Process, pick_and_place
 from .shuffle import shuffled
 from .step import Observer, Outcome, Step
 
 __all__ = [
+    "CloseFingers",
     "Context",
     "Episode",
     "EpisodeStatus",
@@ -17,6 +19,7 @@ __all__ = [
     "Observer",
     "Outcome",
     "Process",
+    "RateFingers",
     "Refine",
     "Step",
     "StepRecord",
