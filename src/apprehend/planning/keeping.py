@@ -41,7 +41,7 @@ class Constraints:
 
     def values(self, q: Array) -> Array:
         """Values ``(..., I, 3)`` of the I constraints; those that a constraint does not have are 0."""
-        rows = np.ascontiguousarray(q, np.float64).reshape(-1, self.robot.n)
+        rows = fresh(q).reshape(-1, self.robot.n)
         out = np.zeros((len(rows), 3 * len(self.items)))
         if out.size:
             over_ranges(lambda a, b: constrain.values_many(self.compiled, rows, a, b, out), len(rows), GRAIN)
@@ -65,7 +65,7 @@ class Constraints:
         return f"{self.items[first].words(value[first])}; {self._elsewhere(q)}"
 
     def _elsewhere(self, q: Array) -> str:
-        limits, many = self.robot.limits, len(self.items) > 1
+        limits, many = self.robot.limits_model, len(self.items) > 1
         what = "all constraints" if many else "the constraint"
         near, good = self.project(q[None], limits.lower, limits.upper)
         if good[0]:
@@ -81,7 +81,7 @@ class Constraints:
 
     def hold(self, qa: Array, qb: Array) -> BoolArray:
         """Whether the constraints hold all along each straight motion ``(N, n)``: proven (`kernels.constrain_hold`)."""
-        rows_a, rows_b = np.ascontiguousarray(qa, np.float64), np.ascontiguousarray(qb, np.float64)
+        rows_a, rows_b = fresh(qa), fresh(qb)
         out = np.ones(len(rows_a), bool)
         if self.items and len(rows_a):
             over_ranges(
@@ -91,13 +91,18 @@ class Constraints:
 
     def project(self, q: Array, lower: Array, upper: Array) -> tuple[Array, BoolArray]:
         """Configurations ``(N, n)`` near *q* that keep all bounds with 1.5 slacks to spare, and where that worked."""
-        near = np.array(q, np.float64)
+        near, lower, upper = fresh(q), fresh(lower), fresh(upper)
         good = np.ones(len(near), bool)
         if len(near):
             over_ranges(
                 lambda a, b: constrain.project_many(self.compiled, near, lower, upper, a, b, good), len(near), GRAIN
             )
         return near, good
+
+
+def fresh(values: Array) -> Array:
+    """A writable copy, row by row: kernels are compiled for no other."""
+    return np.array(values, np.float64, order="C")
 
 
 def compile_constraints(robot: Robot, items: Sequence[PathConstraint], moving: BoolArray) -> ConstrainModel:

@@ -102,7 +102,7 @@ def _task(
     model: CollisionModel, q0: Array, targets: Array, moving: BoolArray, keep: Constraints | None
 ) -> _Task | PlanResult:
     """What is to be planned, or the reason why there is nothing to plan."""
-    robot, limits = model.robot, model.robot.limits
+    robot, limits = model.robot, model.robot.limits_model
     if not len(targets):
         return PlanResult(PlanStatus.NO_GOAL)
     ends = np.concatenate([q0[None], targets])

@@ -66,7 +66,7 @@ def straight(
     chain = np.zeros(robot.n, bool)
     chain[list(robot.chain(frame))] = True
     free = np.flatnonzero(chain & moving_joints(robot, joints))
-    lower, upper = robot.limits.lower, robot.limits.upper
+    lower, upper = robot.limits_model.lower, robot.limits_model.upper
 
     def answer(status: PlanStatus, path: list[Array], s: float, detail: str = "", **facts: object) -> PlanResult:
         seconds = time.perf_counter() - began
