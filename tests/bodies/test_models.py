@@ -264,3 +264,28 @@ def test_branch_and_bound_finds_the_closed_form() -> None:
     )
     assert lower <= 1.0 <= upper
     assert upper - lower < 0.07
+
+
+def test_the_part_that_sticks_out_is_cut_first() -> None:
+    """A dumb-bell with one wide end: the model gets closer with every few shapes, as far as the shapes allow."""
+    rod, end = Body.cylinder(0.004, 0.2), Body.sphere(0.02)
+    vertices = np.concatenate([rod.vertices, end.vertices + [0.0, 0.0, 0.1], 0.6 * end.vertices - [0.0, 0.0, 0.1]])
+    n = len(rod.vertices)
+    faces = np.concatenate([rod.faces, end.faces + n, end.faces + n + len(end.vertices)])
+    body = Body.from_mesh(vertices, faces)
+    for kind in ("boxes", "spheres", "capsules"):
+        out = [body.deviation(body.model(kind, count)).outward for count in (1, 4, 16)]
+        assert out[1] < 0.9 * out[0]
+        assert out[2] <= 1.06 * out[1]
+
+
+def test_distance_from_convex_pieces_is_a_lower_bound_with_the_right_sign() -> None:
+    body = Body.household("screwdriver")
+    model = body.convex()
+    points = RNG(6).uniform(body.bounds[0] - 0.05, body.bounds[1] + 0.05, (3000, 3))
+    found = model.distance(points)
+    each = [SurfaceMesh(*piece).distance(points) for piece in model.pieces]
+    exact = np.min(each, axis=0)
+    assert ((found <= 0.0) == (exact <= 0.0)).all()
+    outside = exact > 0.0
+    assert (found[outside] <= exact[outside] + 1e-12).all()

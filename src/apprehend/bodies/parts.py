@@ -35,13 +35,16 @@ class _Part:
         return cls(triangles, solid, cost(high - low) - (float(solid.volume()) if solid is not None else 0.0))
 
 
-def partitions(vertices: Array, faces: IntArray, count: int, cost: Cost) -> Iterator[list[Array]]:
+def partitions(
+    vertices: Array, faces: IntArray, count: int, cost: Cost, sticks_out: Callable[[Array], float] | None = None
+) -> Iterator[list[Array]]:
     """Finer and finer partitions of a body, up to *count* parts: the corners ``(V, 3)`` of the parts' convex hulls.
 
-    The hulls of each partition contain the body together. The part whose shape exceeds it most is cut, across the
-    axis of the body's smallest box where the two shapes become smallest. A closed 2-manifold is cut as a solid, so
-    that its parts have the faces of the cuts, and pieces that come apart are parts of their own. Of another mesh the
-    surface is cut (and contained), no more. Parts that stay are the same arrays in the next partition.
+    The hulls of each partition contain the body together. The part whose shape *sticks_out* most (of the corners of
+    its hull; None: whose shape exceeds it by the largest volume) is cut, across the axis of the body's smallest box
+    where the two shapes become smallest. A closed 2-manifold is cut as a solid, so that its parts have the faces of
+    the cuts, and pieces that come apart are parts of their own. Of another mesh the surface is cut (and contained), no
+    more. Parts that stay are the same arrays in the next partition.
     """
     corners = fit.hull_points(vertices[faces].reshape(-1, 3))
     yield [corners]
@@ -55,8 +58,12 @@ def partitions(vertices: Array, faces: IntArray, count: int, cost: Cost) -> Iter
     found, hulls = [_Part.of(turned[faces], solid, cost)], [corners]
     enough = ENOUGH * float(solid.volume()) if solid is not None else 0.0
     while len(found) < count:
-        k = int(np.argmax([part.excess for part in found]))
-        if found[k].excess <= enough:
+        worth = [
+            (part.excess if sticks_out is None else sticks_out(its)) if part.excess > enough else -np.inf
+            for part, its in zip(found, hulls)
+        ]
+        k = int(np.argmax(worth))
+        if worth[k] == -np.inf:
             return
         pieces = _divided(found[k], cost, count - len(found) + 1)
         if len(pieces) < 2:

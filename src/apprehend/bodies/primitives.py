@@ -295,11 +295,7 @@ class ConvexPieces(Primitives):
 
     def _outside_on(self, triangles: Array) -> Array:
         """What `_outside` does not exceed on triangles ``(N, 3, 3)``: for one piece it is largest at a corner."""
-        least = np.full(len(triangles), np.inf)
-        for planes in self._planes:
-            corners = triangles.reshape(-1, 3) @ planes[:, :3].T - planes[:, 3]
-            least = np.minimum(least, corners.max(axis=1).reshape(-1, 3).max(axis=1))
-        return np.asarray(np.maximum(least, 0.0))
+        return np.maximum(self._beyond(triangles), 0.0)
 
     @cached_property
     def _planes(self) -> list[Array]:
@@ -308,12 +304,26 @@ class ConvexPieces(Primitives):
         return [_planes(v[f]) for v, f in self.pieces]
 
     def _distance(self, points: Array) -> Array:
-        best = np.full(len(points), np.inf)
-        for planes in self._planes:
-            for first in range(0, len(points), 20_000):
-                few = slice(first, first + 20_000)
-                beyond = (points[few] @ planes[:, :3].T - planes[:, 3]).max(axis=1)
-                best[few] = np.minimum(best[few], beyond)
+        return self._beyond(points[:, None])
+
+    def _beyond(self, groups: Array) -> Array:
+        """How far the corners of ``groups (N, c, 3)`` are beyond the planes of a piece at most, for the nearest piece.
+
+        The sides of the box around a piece count as planes of it, so that most groups are done with most pieces after
+        six of them.
+        """
+        best = np.full(len(groups), np.inf)
+        boxes = np.array([[v.min(axis=0), v.max(axis=0)] for v, _ in self.pieces])
+        for first in range(0, len(groups), 4096):
+            few = groups[first : first + 4096]
+            aside = np.stack([np.maximum(low - few, few - high).max(axis=(1, 2)) for low, high in boxes])
+            least = best[first : first + 4096]
+            for k in np.argsort(aside.min(axis=1)):
+                near = aside[k] < least
+                if near.any():
+                    planes = self._planes[k]
+                    beyond = (few[near] @ planes[:, :3].T - planes[:, 3]).max(axis=(1, 2))
+                    least[near] = np.minimum(least[near], np.maximum(beyond, aside[k, near]))
         return best
 
     def at(self, pose: ArrayLike) -> Self:
@@ -339,7 +349,7 @@ Fitted = TypeVar("Fitted", bound=Primitives)
 
 
 def _best(make: Callable[[Array], Fitted], index: MeshIndex, count: int, cost: Cost) -> Fitted:
-    """The model of at most *count* shapes that sticks out least, then of the smallest union, judged by sample points.
+    """The model of at most *count* shapes of the smallest union among those that stick out least but for 5 %.
 
     *make* fits one shape to the corners of each part; every part is fitted once.
     """
@@ -350,18 +360,24 @@ def _best(make: Callable[[Array], Fitted], index: MeshIndex, count: int, cost: C
     points = np.random.default_rng(0).uniform(low - pad, high + pad, (SAMPLES, 3))
     away = index.signed_distance(points) if count > 1 else np.zeros(len(points))
     shapes_of: dict[int, tuple[Fitted, BoolArray, Array]] = {}
-    best: tuple[tuple[float, int], list[Fitted]] | None = None
-    for partition in partitions(index.vertices, index.faces, count, cost):
-        for part in partition:
-            if id(part) not in shapes_of:
-                model = make(part)
-                shapes_of[id(part)] = model, model.inside(points), part
-        covered = np.any([shapes_of[id(part)][1] for part in partition], axis=0)
-        score = float(away[covered].max(initial=0.0)), int(covered.sum())
-        if best is None or score < best[0]:
-            best = score, [shapes_of[id(part)][0] for part in partition]
-    assert best is not None
-    first, *others = best[1]
+
+    def fitted(part: Array) -> tuple[Fitted, BoolArray, Array]:
+        if id(part) not in shapes_of:
+            model = make(part)
+            shapes_of[id(part)] = model, model.inside(points), part
+        return shapes_of[id(part)]
+
+    def sticks_out(part: Array) -> float:
+        return float(away[fitted(part)[1]].max(initial=0.0))
+
+    found: list[tuple[float, int, list[Fitted]]] = []
+    for partition in partitions(index.vertices, index.faces, count, cost, sticks_out):
+        covered = np.any([fitted(part)[1] for part in partition], axis=0)
+        outward = float(away[covered].max(initial=0.0))
+        found.append((outward, int(covered.sum()), [fitted(part)[0] for part in partition]))
+    enough = 1.05 * min(outward for outward, _, _ in found)
+    best = min((f for f in found if f[0] <= enough), key=lambda f: f[1])[2]
+    first, *others = best
     return first.joined(*others)
 
 
