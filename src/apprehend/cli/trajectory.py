@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .console import console, print_json
+
+if TYPE_CHECKING:
+    from ..arrays import Array
+    from ..kinematics import Robot
+    from ..trajectory import Limits, Trajectory
 
 
 def command(
@@ -32,8 +37,6 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
 ) -> int:
     """Time a path. Exit code 0: a motion with proven limits; 1: there is none, and why; 2: wrong input."""
-    import numpy as np
-
     from .. import trajectory as tj
     from ..errors import InputError, UnsuccessfulError
     from ..kinematics import Robot
@@ -43,36 +46,11 @@ def command(
     names = arm.joint_names if arm is not None else None
     if arm is not None and points.shape[1] != arm.n:
         raise InputError(f"{waypoints} has {points.shape[1]} columns; robot {arm.name!r} has {arm.n} joints: {names}")
-    of_arm = arm.limits if arm is not None else None
-    if acceleration is None and (of_arm is None or not np.isfinite(of_arm.acceleration).all()):
-        raise InputError(
-            f"{f'robot {arm.name!r}' if arm is not None else 'a motion without --robot'} has no acceleration limits of "
-            "its own; give --acceleration (rad/s² or m/s² of every joint)"
-        )
-    limits = tj.Limits(
-        velocity=velocity if velocity is not None else of_arm.velocity if of_arm is not None else None,
-        acceleration=acceleration if acceleration is not None else of_arm.acceleration if of_arm is not None else None,
-        jerk=jerk,
-        position=np.stack([of_arm.lower, of_arm.upper], axis=1) if of_arm is not None else None,
-    )
+    limits = _limits(arm, velocity, acceleration, jerk)
     if torque and arm is None:
         raise InputError("--torque needs --robot: the torques follow from its dynamics")
-    violation = 0.0
     try:
-        if straight and deviation == 0.0:
-            if torque or jerk is not None:
-                raise InputError("straight segments with stops take no --torque or --jerk; give a --deviation > 0")
-            motion = tj.follow(points, limits)
-        else:
-            path = tj.rounded(points, deviation) if straight else tj.Spline(points)
-            if jerk is not None:
-                if torque:
-                    raise InputError("--jerk and --torque together are not supported; choose one")
-                motion = tj.jerk_limited(path, limits, least=8)
-            else:
-                constraints = [tj.TorqueLimits(arm)] if torque and arm is not None else []
-                timing = tj.time_optimal(path, limits, constraints=constraints, grid=grid, least=8).require_success()
-                motion, violation = timing.motion, timing.violation
+        motion, violation = _motion(points, limits, straight, deviation, grid, arm if torque else None)
     except UnsuccessfulError as error:
         if as_json:
             print_json({"success": False, "why": str(error)})
@@ -103,6 +81,48 @@ def command(
         if out is not None:
             console.print(f"written: {out}")
     return 0 if report.success else 1
+
+
+def _limits(arm: Robot | None, velocity: float | None, acceleration: float | None, jerk: float | None) -> Limits:
+    """What was asked for, and otherwise what the robot can do."""
+    import numpy as np
+
+    from ..errors import InputError
+    from ..trajectory import Limits
+
+    own = arm.limits if arm is not None else None
+    if acceleration is None and (own is None or not np.isfinite(own.acceleration).all()):
+        raise InputError(
+            f"{f'robot {arm.name!r}' if arm is not None else 'a motion without --robot'} has no acceleration limits of "
+            "its own; give --acceleration (rad/s² or m/s² of every joint)"
+        )
+    return Limits(
+        velocity=velocity if velocity is not None else own.velocity if own is not None else None,
+        acceleration=acceleration if acceleration is not None else own.acceleration if own is not None else None,
+        jerk=jerk,
+        position=np.stack([own.lower, own.upper], axis=1) if own is not None else None,
+    )
+
+
+def _motion(
+    points: Array, limits: Limits, straight: bool, deviation: float, grid: int, arm: Robot | None
+) -> tuple[Trajectory, float]:
+    """The fastest motion within the limits (and those of the torques of *arm*), and by how much it exceeds any."""
+    from .. import trajectory as tj
+    from ..errors import InputError
+
+    if straight and deviation == 0.0:
+        if arm is not None or limits.jerk is not None:
+            raise InputError("straight segments with stops take no --torque or --jerk; give a --deviation > 0")
+        return tj.follow(points, limits), 0.0
+    path = tj.rounded(points, deviation) if straight else tj.Spline(points)
+    if limits.jerk is not None:
+        if arm is not None:
+            raise InputError("--jerk and --torque together are not supported; choose one")
+        return tj.jerk_limited(path, limits, least=8), 0.0
+    constraints = [tj.TorqueLimits(arm)] if arm is not None else []
+    timing = tj.time_optimal(path, limits, constraints=constraints, grid=grid, least=8).require_success()
+    return timing.motion, timing.violation
 
 
 def _write(motion: Any, out: Path, dt: float, names: Any) -> None:
