@@ -16,6 +16,7 @@ from .gjk import AXIS, BARY, NEAR, ROWS, difference, nearest_on_triangle
 
 MAX_POINTS = 260
 MAX_FACES = 1024
+MAX_TURNS = 1000
 FLAT = 1e-12
 
 NORMAL = 0  # columns of a face: outward unit normal and distance from the origin, its corners, an edge of the rim
@@ -171,7 +172,7 @@ def depth(ints, floats, points, graph, a, b, ws, n, big):
         difference(ints, floats, points, graph, a, b, x, y, z, ws, w)
         h = x * w[0] + y * w[1] + z * w[2]
         if h < best:
-            best = max(h, 0.0)
+            best = h  # below zero: they do not overlap after all
             axis[0], axis[1], axis[2] = -x, -y, -z
         if h - F[near, 3] <= 1e-13 * size + 1e-10 * abs(h) or best - low <= 1e-10 * best + 1e-13 * size:
             break
@@ -193,7 +194,9 @@ def polish(ints, floats, points, graph, a, b, ws, row, best):
     """
     axis = ws[AXIS]
     step = 0.02
-    while step > 1e-10:
+    for _ in range(MAX_TURNS):
+        if step < 1e-10:
+            break
         ux, uy, uz = axis[1], -axis[0], 0.0
         if abs(axis[2]) > 0.7:
             ux, uy, uz = 0.0, axis[2], -axis[1]
@@ -210,7 +213,7 @@ def polish(ints, floats, points, graph, a, b, ws, row, best):
             difference(ints, floats, points, graph, a, b, -x, -y, -z, ws, row)
             h = -(x * row[0] + y * row[1] + z * row[2])
             if h < best:
-                best = max(h, 0.0)
+                best = h  # below zero: a plane between them, the cores do not overlap
                 axis[0], axis[1], axis[2] = x, y, z
                 moved = True
                 break

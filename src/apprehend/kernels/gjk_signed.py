@@ -53,7 +53,7 @@ def settle(ints, floats, points, graph, a, b, ws, distance):
         error = abs(px - lower * ux) + abs(py - lower * uy) + abs(pz - lower * uz)
         if error < least and (distance > 0.0 or lower >= distance - fine):
             least = error
-            answer = lower if lower < 0.0 and (distance < 0.0 or lower > -reach) else reach
+            answer = lower if lower < 0.0 and (distance < 0.0 or lower > -reach or error < reach) else reach
             witnesses(ws, rows)
             for c in range(3):
                 normal[c] = axis[c] / upper
