@@ -71,6 +71,40 @@ def advance(q, step, lower, upper, n):
         store(q, c * L, smaller(larger(v, lower[c]), upper[c]))
 
 
+@kernel(borrow=True)
+def load_starts(
+    data, guesses, seed, lower, upper, low, high, fixed, following, last, owner, number, age, past, mine, q
+):
+    """A lane without a target takes the next, one whose start is over (age < 0) its next start.
+
+    Returns the number of the target that follows, and how many were taken.
+    """
+    taken = 0
+    for l in range(L):
+        if owner[l] >= 0 and age[l] >= 0.0:
+            continue
+        if owner[l] < 0 and following < last:
+            owner[l] = following
+            following += 1
+            taken += 1
+            number[l] = 0
+            for t in range(mine.shape[1]):
+                for j in range(16):
+                    mine[l, t, j] = data[owner[l], t, j]
+        if owner[l] < 0:
+            continue
+        age[l], past[l] = 0.0, 1e300
+        s = number[l]
+        for c in range(lower.shape[0]):
+            if s < guesses.shape[1]:
+                q[c * L + l] = min(max(guesses[owner[l], s, c], lower[c]), upper[c])
+            elif fixed[c]:
+                q[c * L + l] = guesses[owner[l], 0, c]
+            else:
+                q[c * L + l] = low[c] + (high[c] - low[c]) * uniform(seed, s, c)
+    return following, taken
+
+
 @kernel
 def solve_tree(
     tree,
@@ -117,26 +151,10 @@ def solve_tree(
         number[l] = -1
     fresh = True
     while working > 0 or fresh:
-        for l in range(L):
-            # a lane without a target, or whose start is over, takes the next
-            if owner[l] >= 0 and age[l] >= 0.0:
-                continue
-            if owner[l] < 0 and following < last:
-                owner[l] = following
-                following += 1
-                working += 1
-                number[l] = 0
-                mine[l] = data[owner[l]]
-            if owner[l] >= 0:
-                age[l], past[l] = 0.0, 1e300
-                s = number[l]
-                for c in range(n):
-                    if s < guesses.shape[1]:
-                        q[c * L + l] = min(max(guesses[owner[l], s, c], lower[c]), upper[c])
-                    elif fixed[c]:
-                        q[c * L + l] = guesses[owner[l], 0, c]
-                    else:
-                        q[c * L + l] = low[c] + (high[c] - low[c]) * uniform(seed, s, c)
+        following, taken = load_starts(
+            data, guesses, seed, lower, upper, low, high, fixed, following, last, owner, number, age, past, mine, q
+        )
+        working += taken
         fresh = False
         tree_block(tree, q, value, poses)
         task_block(tree, tasks, mine, goal, q, 0, L, poses, J, e)
