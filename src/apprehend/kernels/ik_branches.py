@@ -2,10 +2,9 @@
 
 A geometry is the robot at zero: directions ``h (6, 3)`` of the axes, points ``o (7, 3)`` (one on each axis, then the frame's
 origin), and the frame's rotation ``R0``. With R_i the rotation by θ_i about h_i, the frame is at
-``p = o_0 + R_1 (o_1 − o_0 + R_2 (… R_6 (o_6 − o_5)))`` with the rotation ``R_1 … R_6 R0``. Vectors are tuples of three
-numbers, so that they stay in registers. The subproblems are those of Paden (1986) and Kahan as extended by Elias and Wen
-(2022): 1 turns a vector into another, 3 to a given distance, 4 to a given height. A general regional structure leads
-to a quartic (Pieper 1968).
+``p = o_0 + R_1 (o_1 − o_0 + R_2 (… R_6 (o_6 − o_5)))`` with the rotation ``R_1 … R_6 R0``. Vectors are tuples
+(`triples`). The subproblems are those of Paden (1986) and Kahan as extended by Elias and Wen (2022): 1 turns a vector
+into another, 3 to a given distance, 4 to a given height. A general regional structure leads to a quartic (Pieper 1968).
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ import numpy as np
 
 from ._jit import kernel
 from .lanes import sincos
+from .triples import across, add, apply, cross, dot, row, sub, turn, turn_by
 
 SPHERICAL_WRIST = 1
 THREE_PARALLEL = 2
@@ -25,69 +25,6 @@ EXACT = 1e-9  # slack of subproblems whose geometry is the arm's own
 ALIKE = 1e-9
 ALIGNED = 1e-7  # sine of the angle below which two axes count as parallel
 MOST = 16  # room for branches; the families here have up to 8
-
-
-@kernel
-def dot(a, b):
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@kernel
-def cross(a, b):
-    """Vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@kernel
-def add(a, b):
-    """Sum."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-@kernel
-def sub(a, b):
-    """Difference."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@kernel
-def row(M, i):
-    """Row of a matrix with three columns."""
-    return M[i, 0], M[i, 1], M[i, 2]
-
-
-@kernel
-def turn(h, angle, v):
-    """Rodrigues: *v* turned about the unit vector *h*."""
-    s, c = sincos(angle)
-    return turn_by(h, s, c, v)
-
-
-@kernel
-def turn_by(h, s, c, v):
-    """As `turn`, by an angle whose sine and cosine are known."""
-    k = cross(h, v)
-    f = (1.0 - c) * dot(h, v)
-    return c * v[0] + s * k[0] + f * h[0], c * v[1] + s * k[1] + f * h[1], c * v[2] + s * k[2] + f * h[2]
-
-
-@kernel
-def apply(R, v):
-    """R v for a matrix."""
-    return (
-        R[0, 0] * v[0] + R[0, 1] * v[1] + R[0, 2] * v[2],
-        R[1, 0] * v[0] + R[1, 1] * v[1] + R[1, 2] * v[2],
-        R[2, 0] * v[0] + R[2, 1] * v[1] + R[2, 2] * v[2],
-    )
-
-
-@kernel
-def across(h):
-    """A vector of length about one across *h*."""
-    if abs(h[0]) < 0.6:
-        return cross(h, (1.0, 0.0, 0.0))
-    return cross(h, (0.0, 1.0, 0.0))
 
 
 @kernel
