@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..kernels import cone
+from ..kernels import cone, cone_rows
 from ..parallel import over_ranges
 from .contact import Contact, ContactModel
 
@@ -66,7 +66,7 @@ def run(
         D, H, w, S = (v if len(v) == 1 else v[i:j] for v in (columns, right, wrenches, begin))
         cone.solve(D, H, w, cones, kinds, floor, S, share, chain, MOST_STEPS, out[i:j])
 
-    over_ranges(work, count, 4 * cone.WIDTH)
+    over_ranges(work, count, 4 * cone_rows.WIDTH)
     return out
 
 
