@@ -279,10 +279,10 @@ def gjk(ints, floats, points, graph, a, b, ws, above, below, relative_gap):
     """
     rel, bary, axis = ws[REL], ws[BARY], ws[AXIS]
     vx, vy, vz = axis[0], axis[1], axis[2]
-    if vx * vx + vy * vy + vz * vz < 1e-20:
+    if vx * vx + vy * vy + vz * vz < 1e-300:
         vx, vy, vz = -rel[9], -rel[10], -rel[11]
-        if vx * vx + vy * vy + vz * vz < 1e-20:
-            vx = 1.0
+        if vx * vx + vy * vy + vz * vz < 1e-300:
+            vx, vy, vz = 1.0, 0.0, 0.0
     difference(ints, floats, points, graph, a, b, -vx, -vy, -vz, ws, ws[0])
     norm = math.sqrt(vx * vx + vy * vy + vz * vz)
     lower = max(0.0, (vx * ws[0, 0] + vy * ws[0, 1] + vz * ws[0, 2]) / norm)

@@ -82,9 +82,10 @@ def tetrahedron(ints, floats, points, graph, a, b, ws, P, n, across):
     Returns 4, or a smaller number when the difference is flat; ``ws[AXIS]`` is then a direction without extent.
     """
     normal = ws[AXIS]
-    size = 0.0
+    fine = floats[a, 7] + floats[b, 7]
     for i in range(n):
-        size = max(size, abs(P[i, 0]) + abs(P[i, 1]) + abs(P[i, 2]))
+        fine = max(fine, abs(P[i, 3]) + abs(P[i, 4]) + abs(P[i, 5]))
+    fine *= FLAT
     if n == 1:
         for trial in range(6):
             s = 1.0 if trial % 2 == 0 else -1.0
@@ -92,9 +93,8 @@ def tetrahedron(ints, floats, points, graph, a, b, ws, P, n, across):
             x, y, z = (s if c == 0 else 0.0), (s if c == 1 else 0.0), (s if c == 2 else 0.0)
             difference(ints, floats, points, graph, a, b, x, y, z, ws, P[1])
             gap = abs(P[1, 0] - P[0, 0]) + abs(P[1, 1] - P[0, 1]) + abs(P[1, 2] - P[0, 2])
-            if gap > FLAT * (1.0 + size):
+            if gap > fine:
                 n = 2
-                size = max(size, gap)
                 break
         if n == 1:
             normal[0], normal[1], normal[2] = 0.0, 0.0, 1.0
@@ -114,7 +114,7 @@ def tetrahedron(ints, floats, points, graph, a, b, ws, P, n, across):
                 for i in range(3):
                     h += across[3 * k + i] * (P[2, i] - P[0, i])
                 gap = max(gap, abs(h))
-            if gap > FLAT * (1.0 + size):
+            if gap > fine:
                 n = 3
                 break
         if n == 2:
@@ -130,7 +130,7 @@ def tetrahedron(ints, floats, points, graph, a, b, ws, P, n, across):
             s = 1.0 if trial == 0 else -1.0
             difference(ints, floats, points, graph, a, b, s * x, s * y, s * z, ws, P[3])
             gap = abs(x * (P[3, 0] - P[0, 0]) + y * (P[3, 1] - P[0, 1]) + z * (P[3, 2] - P[0, 2]))
-            if gap > FLAT * (1.0 + size):
+            if gap > fine:
                 return 4
         normal[0], normal[1], normal[2] = x, y, z
         return 3

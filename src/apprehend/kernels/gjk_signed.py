@@ -14,6 +14,9 @@ from .gjk_depth import depth
 SURE = 1e-13
 """A distance is settled until its bounds differ by no more than this share of it, or a hundredth of it of the size."""
 
+CLOSE = 1e-8
+"""Below this share of the size the plane that the nearest points make is tried before it is believed."""
+
 SETTLE = 8  # steps, at most
 
 
@@ -79,12 +82,19 @@ def signed_distance(ints, floats, points, graph, a, b, ws, big):
     rows, lower, upper = gjk(ints, floats, points, graph, a, b, ws, 1e300, 0.0, 1e-15)
     if rows < 4:
         witnesses(ws, rows)
-    if upper > 0.0:
+    size = floats[a, 7] + floats[b, 7]
+    apart = lower > 0.0
+    if apart:
         distance = upper
         for c in range(3):
             ws[AXIS, c] /= upper
-        sure = upper - lower <= SURE * max(upper, 0.01 * (floats[a, 7] + floats[b, 7]))
-    else:
+        sure = upper - lower <= SURE * max(upper, 0.01 * size)
+        if upper < CLOSE * size:  # rounding may have turned the plane between them
+            x, y, z = ws[AXIS, 0], ws[AXIS, 1], ws[AXIS, 2]
+            row = ws[SPARE]
+            difference(ints, floats, points, graph, a, b, -x, -y, -z, ws, row)
+            sure = apart = upper - (x * row[0] + y * row[1] + z * row[2]) <= SURE * size
+    if not apart:  # no plane between them that holds: the "depth" may be below zero, too
         upper, sure = depth(ints, floats, points, graph, a, b, ws, rows, big)
         distance = -upper
     if not sure:
