@@ -20,7 +20,7 @@ from ..kernels import tree as tree_kernels
 from ..kernels.chain import ChainModel
 from ..kernels.coriolis import coriolis_matrix
 from ..kernels.tree import TreeModel
-from ..robots.description import Description, Joint, JointType
+from ..robots.description import Description, JointType
 from . import differential, dynamics, memory
 from .loops import LoopConstraint
 from .model import chain_model, frame_names, tree_model
@@ -173,18 +173,8 @@ class Robot:
 
     @cached_property
     def _home(self) -> Array:
-        values = [self._home_of(joint) for joint in self.description.free_joints]
+        values = [self.description.rest(joint) for joint in self.description.free_joints]
         return np.array(values, dtype=np.float64)
-
-    def _home_of(self, joint: Joint) -> float:
-        if joint.name in self.description.home:
-            return float(self.description.home[joint.name])
-        lower, upper = joint.limits.lower, joint.limits.upper
-        if joint.type is JointType.CONTINUOUS:
-            return 0.0
-        if np.isfinite(lower) and np.isfinite(upper):
-            return 0.5 * (lower + upper)
-        return min(max(0.0, lower), upper)
 
     @cached_property
     def transmission(self) -> Transmission:

@@ -169,7 +169,7 @@ class Description:
     root: str
     links: Mapping[str, Link]
     joints: tuple[Joint, ...]
-    home: Mapping[str, float] = field(default_factory=dict)  # joint name → resting value; missing joints: see Robot
+    home: Mapping[str, float] = field(default_factory=dict)  # joint name → resting value; others: see `rest`
     allowed_collisions: frozenset[frozenset[str]] = frozenset()  # pairs of links that may touch
     repairs: tuple[Repair, ...] = ()
     source: Path | None = None
@@ -187,6 +187,20 @@ class Description:
             if joint.name == name:
                 return joint
         unknown_name("joint", name, (j.name for j in self.joints), f"robot {self.name!r}")
+
+    def rest(self, joint: Joint) -> float:
+        """The joint's value in the home posture: as given, 0 if it turns without limits, else the middle of its range.
+
+        With a limit on one side only, what is nearest to 0.
+        """
+        if joint.name in self.home:
+            return float(self.home[joint.name])
+        lower, upper = joint.limits.lower, joint.limits.upper
+        if joint.type is JointType.CONTINUOUS:
+            return 0.0
+        if np.isfinite(lower) and np.isfinite(upper):
+            return 0.5 * (lower + upper)
+        return min(max(0.0, lower), upper)
 
     @property
     def parent_joint(self) -> Mapping[str, Joint]:

@@ -204,10 +204,7 @@ class _Writer:
             self.add(contact, "exclude", body1=pair[0], body2=pair[1])
         if not self.description.home:
             return
-        q: dict[str, float] = {}
-        for joint in self.description.free_joints:
-            rest = min(max(0.0, joint.limits.lower), joint.limits.upper)
-            q[joint.name] = self.description.home.get(joint.name, rest)
+        q = {joint.name: self.description.rest(joint) for joint in self.description.free_joints}
         for joint in self.description.joints:
             if joint.mimic is not None:
                 q[joint.name] = joint.mimic.multiplier * q[joint.mimic.joint] + joint.mimic.offset
