@@ -124,6 +124,7 @@ def block_hit(model, lanes, space, margin, resolution):
     meets, selves, exactly, fixed = lanes.meets, lanes.selves, lanes.exactly, lanes.fixed
     flags, state, order, bounds, rates = own.flags, space.state, own.order, space.bounds, space.rates
     B, C = selves.shape[0], meets.shape[0]
+    none, one = np.int64(-1), np.int64(1)  # as literals they would be types of their own, and compile everything twice
     move_lanes(lanes.links, lanes.joints, own.q, own.poses)
     widest = 0.0
     for lane in range(LANES):
@@ -150,7 +151,7 @@ def block_hit(model, lanes, space, margin, resolution):
             else:
                 count = owns[k, 1] - owns[k, 0]
                 first, stride = meets[c, 2], meets[c, 3]
-                touch = settle(model, lanes, space, k, -1, -1, first, stride, count, margin, rate, resolution)
+                touch = settle(model, lanes, space, k, none, none, first, stride, count, margin, rate, resolution)
         else:
             p = c - C
             a, b = selves[p, 0], selves[p, 1]
@@ -166,7 +167,7 @@ def block_hit(model, lanes, space, margin, resolution):
                 touch = note(state, flags)
             else:
                 first, count = lanes.ranges[p, 0], lanes.ranges[p, 1] - lanes.ranges[p, 0]
-                touch = settle(model, lanes, space, a, b, p, first, 1, count, margin, rate, resolution)
+                touch = settle(model, lanes, space, a, b, p, first, one, count, margin, rate, resolution)
         if touch:
             come_first(order, i)
             return True
