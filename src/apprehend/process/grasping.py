@@ -37,8 +37,12 @@ ARRIVED = 0.05
 
 @dataclass(frozen=True)
 class PlanGrasp:
-    """Plan grasps on the mesh, and choose the best that the arm can approach, lift and place."""
+    """Plan grasps on the mesh, and choose the best that the arm can approach, lift and place.
 
+    *samples* are the tries of the planner, as many as it thinks right where None (`grasp.plan`).
+    """
+
+    samples: int | None = None
     name: str = "plan"
     title: str = "Plan the grasp"
 
@@ -51,7 +55,7 @@ class PlanGrasp:
             wanted, safety = (GRASPS, SAFETY) if context.hand.is_jaw else (FINGER_GRASPS, FINGER_SAFETY)
             context.plan = grasp.plan(
                 context.hand, context.body, wanted, rng=context.rng, table=planes, safety=safety,
-                acceleration=acceleration_of(context),
+                acceleration=acceleration_of(context), samples=self.samples,
             )  # fmt: skip
             context.planes, context.tried = planes, set()
         plan = context.plan
