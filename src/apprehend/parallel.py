@@ -40,19 +40,19 @@ def set_threads(n: int) -> None:
     _threads = n
 
 
-def over_ranges(work: Callable[[int, int], object], count: int, grain: int = 1) -> None:
+def over_ranges(work: Callable[[int, int], object], count: int, grain: int = 1, step: int = 1) -> None:
     """Call ``work(start, stop)`` on contiguous ranges that cover ``range(count)``, on several threads.
 
     *grain* is the smallest range worth a thread of its own; the first range, and all of a batch below two grains, runs
-    in the caller's thread, and so does all that is asked for within a range. An exception in any range is
-    raised here.
+    in the caller's thread, and so does all that is asked for within a range. Ranges begin at multiples of *step*, for
+    work that carries something from one problem to the next. An exception in any range is raised here.
     """
-    parts = min(threads(), max(1, count // max(grain, 1)))
+    parts = min(threads(), max(1, count // max(grain, step, 1)))
     if parts <= 1 or getattr(_this, "helps", False):
         work(0, count)
         return
     pool = _helpers(parts - 1)
-    edges = [count * i // parts for i in range(parts + 1)]
+    edges = [*(count * i // (parts * step) * step for i in range(parts)), count]
     futures = [pool.submit(_help, work, a, b) for a, b in zip(edges[1:-1], edges[2:], strict=True)]
     try:
         work(edges[0], edges[1])

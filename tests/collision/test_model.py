@@ -134,6 +134,28 @@ def test_obstacles_come_and_go() -> None:
         model.distance(np.zeros(3))
 
 
+def test_distances_of_a_real_arm_are_the_same_bits_with_any_number_of_threads() -> None:
+    from apprehend import parallel
+
+    scene = Scene.tabletop("ur5e", body="mug")
+    model = CollisionModel(scene.robot, scene)
+    limits = scene.robot.limits
+    q = np.random.default_rng(0).uniform(limits.lower, limits.upper, (2, 150, scene.robot.n)).clip(-3.0, 3.0)
+    before, answers = parallel.threads(), []
+    try:
+        for count in (1, 2, 3):
+            parallel.set_threads(count)
+            pairs, closest = model.distances(q[0, :50]), model.closest(q[0])
+            answers.append(
+                (closest.distance, closest.points, pairs.distance, *model.edge_hits(*q), model.edges_free(*q))
+            )
+    finally:
+        parallel.set_threads(before)
+    for other in answers[1:]:
+        for one, same in zip(answers[0], other, strict=True):
+            np.testing.assert_array_equal(one, same)
+
+
 def test_batches_keep_their_shape_and_do_not_depend_on_threads() -> None:
     from apprehend.parallel import set_threads, threads
 

@@ -313,3 +313,13 @@ def test_what_has_no_closed_form_says_so() -> None:
         ik.branches(from_axes(H, P), np.eye(4)[None]).solutions()
     assert ik.redundant_joint(two_arms(), "left_tip") == "left_j1"
     assert ik.redundant_joint(chain("RRRRRR"), "tip") is None
+
+
+def test_a_target_gets_the_same_bits_whichever_targets_are_asked_for_with_it() -> None:
+    robot = Robot.load("panda")
+    q = np.random.default_rng(0).uniform(robot.limits.lower, robot.limits.upper, (3000, robot.n))
+    T = robot.fk(q, "panda_hand")
+    whole = ik.branches(robot, T, "panda_hand", redundancy=q[:, 6])
+    part = ik.branches(robot, T[1501:], "panda_hand", redundancy=q[1501:, 6])
+    np.testing.assert_array_equal(whole.q[1501:], part.q)
+    np.testing.assert_array_equal(whole.residual[1501:], part.residual)

@@ -131,12 +131,13 @@ class CollisionModel(Arrangement):
         rows_a, rows_b, shape = self._motions(qa, qb)
         blocked = np.zeros(len(rows_a), np.int64)
         lanes, exact, margin = self.lanes, self.compiled, self.clearance
+        every = _neighbours(len(rows_a))
 
         def work(start: int, stop: int) -> None:
-            collide_edges.edges(exact, lanes, rows_a, rows_b, margin, step, start, stop, blocked)
+            collide_edges.edges(exact, lanes, rows_a, rows_b, margin, step, every, start, stop, blocked)
 
         if len(rows_a):
-            over_ranges(work, len(rows_a), 1)
+            over_ranges(work, len(rows_a), step=every)
         return np.asarray(blocked.reshape(shape) == 0)
 
     def _motions(self, qa: ArrayLike, qb: ArrayLike) -> tuple[Array, Array, tuple[int, ...]]:
@@ -233,15 +234,16 @@ class CollisionModel(Arrangement):
         return distance.reshape(shape), slope.reshape(*shape, self.robot.n)
 
     def _nearest(self, rows: Array) -> tuple[Array, IntArray, Array]:
-        model = self.compiled
+        model, every = self.compiled, _neighbours(len(rows))
         distance, number, out = np.full(len(rows), np.inf), np.full(len(rows), -1, np.int64), np.zeros((len(rows), 9))
         if len(model.pairs) == 0:
             raise InputError("there is no pair of things that could collide, so there is no distance")
         if len(rows):
             over_ranges(
-                lambda a, b: collide.distances(model, rows, a, b, distance, number, out),
+                lambda a, b: collide.distances(model, rows, every, a, b, distance, number, out),
                 len(rows),
                 GRAIN,
+                every,
             )
         return distance, number, out
 
@@ -284,12 +286,15 @@ class CollisionModel(Arrangement):
         )
 
     def _block_distances(self, rows: Array, within: float) -> tuple[Array, IntArray, Array]:
-        model = self.compiled
+        model, every = self.compiled, _neighbours(len(rows))
         size = (len(rows), len(model.blocks))
         distance, number, out = np.zeros(size), np.full(size, -1, np.int64), np.zeros((*size, 9))
         if distance.size:
             over_ranges(
-                lambda a, b: collide.block_distances(model, rows, within, a, b, distance, number, out), len(rows), GRAIN
+                lambda a, b: collide.block_distances(model, rows, within, every, a, b, distance, number, out),
+                len(rows),
+                GRAIN,
+                every,
             )
         return distance, number, out
 
@@ -304,3 +309,8 @@ class CollisionModel(Arrangement):
     def __repr__(self) -> str:
         moving = sum(node.carrier >= 0 for node in self.nodes)
         return f"<CollisionModel of {self.robot.name!r}: {moving} moving, {len(self.nodes) - moving} standing things>"
+
+
+def _neighbours(count: int) -> int:
+    """How many of *count* problems in a row use what was found before them: whatever the number of threads."""
+    return min(max(count // 8, 1), 32)

@@ -53,6 +53,7 @@ class CollideSpace(NamedTuple):
     shapes: np.ndarray  # (G, 16)
     balls: np.ndarray  # (K, 3), centres of the nodes' bounding spheres in the world
     memory: np.ndarray  # (P, 5): last separating direction of every pair, last vertices
+    used: np.ndarray  # (1,): 0 while that memory is fresh
     ws: np.ndarray  # see `gjk`
     big: np.ndarray  # see `gjk_depth`
     stack: np.ndarray  # see `obstacle`
@@ -74,7 +75,15 @@ def make_space(model):
         shapes[g, DONE] = 1.0
     poses = np.zeros((model.links.shape[0], 12))
     memory, ws = np.zeros((model.pairs.shape[0], 5)), np.zeros((ROWS, 12))
-    return CollideSpace(poses, shapes, balls, memory, ws, depth_scratch(), obstacle_stack())
+    return CollideSpace(poses, shapes, balls, memory, np.zeros(1), ws, depth_scratch(), obstacle_stack())
+
+
+@kernel(borrow=True)
+def forget(space):
+    """Every pair starts afresh if any was asked for: so that answers don't depend on all that a thread did before."""
+    if space.used[0] != 0.0:
+        space.memory[:] = 0.0
+        space.used[0] = 0.0
 
 
 @kernel(borrow=True)
@@ -261,6 +270,7 @@ def covered(model, space, rate, margin, resolution, wanted):
     memory, ws, big, stack = space.memory, space.ws, space.big, space.stack
     blocks, nodes, balls = model.blocks, model.nodes, space.balls
     radius = wanted
+    space.used[0] = 1.0
     for block in range(blocks.shape[0]):
         speed = rate[block]
         need = margin + radius * speed
@@ -289,6 +299,7 @@ def measure(model, p, space, out, best, within):
     poses, shapes, memory = space.poses, space.shapes, space.memory
     ws, big, stack = space.ws, space.big, space.stack
     a, b = model.pairs[p, 0], model.pairs[p, 1]
+    space.used[0] = 1.0
     enough = max(min(best, within), 0.0)
     lower, _ = pair_gap(model.shapes, a, b, poses, shapes, memory[p], ws, big, stack, enough, -1.0, 1e-3)
     if lower > enough:
@@ -305,11 +316,16 @@ def measure(model, p, space, out, best, within):
 
 
 @kernel
-def distances(model, q, start, stop, distance, pair, out):
-    """Smallest signed distance over all pairs for every row of ``q``, its pair, and ``out (N, 9)`` as in `measure`."""
+def distances(model, q, every, start, stop, distance, pair, out):
+    """Smallest signed distance over all pairs for every row of ``q``, its pair, and ``out (N, 9)`` as in `measure`.
+
+    What is remembered of pairs serves *every* so many rows, here and below.
+    """
     space = make_space(model)
     blocks, nodes, balls = model.blocks, model.nodes, space.balls
     for i in range(start, stop):
+        if i % every == 0:
+            forget(space)
         place(model, q[i], space)
         best, found = 1e300, -1
         for block in range(blocks.shape[0]):
@@ -323,7 +339,7 @@ def distances(model, q, start, stop, distance, pair, out):
 
 
 @kernel
-def block_distances(model, q, within, start, stop, distance, pair, out):
+def block_distances(model, q, within, every, start, stop, distance, pair, out):
     """The same for every block: ``distance, pair (N, B)``, ``out (N, B, 9)``.
 
     Blocks farther apart than *within* get a lower bound above it, and −1 as their pair.
@@ -331,6 +347,8 @@ def block_distances(model, q, within, start, stop, distance, pair, out):
     space = make_space(model)
     blocks, nodes, balls = model.blocks, model.nodes, space.balls
     for i in range(start, stop):
+        if i % every == 0:
+            forget(space)
         place(model, q[i], space)
         for block in range(blocks.shape[0]):
             gap = node_gap(nodes, balls, blocks[block, 0], blocks[block, 1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-from .collide import block_rates, covered, make_space, place
+from .collide import block_rates, covered, forget, make_space, place
 from .lane_edges import edge_blocked, edge_space
 
 QUEUE = 4096
@@ -49,10 +49,15 @@ def scan_pieces(model, qa, qb, margin, resolution, space, rate, queue, count):
 
 
 @kernel
-def edges(exact, lanes, qa, qb, margin, resolution, start, stop, blocked):
-    """``blocked[i]``: 1 if the motion ``qa[i] → qb[i]`` hits anything, else 0."""
+def edges(exact, lanes, qa, qb, margin, resolution, every, start, stop, blocked):
+    """``blocked[i]``: 1 if the motion ``qa[i] → qb[i]`` hits anything, else 0.
+
+    What is remembered of pairs of shapes serves *every* so many motions.
+    """
     space = edge_space(exact, lanes, qa.shape[1])
     for i in range(start, stop):
+        if i % every == 0:
+            forget(space.exact)
         blocked[i] = 1 if edge_blocked(exact, lanes, qa[i], qb[i], margin, resolution, space) else 0
 
 
@@ -61,6 +66,7 @@ def edge_hits(model, qa, qb, margin, resolution, start, stop, out, where):
     """``out[i]`` = pair hit on the straight motion ``qa[i] → qb[i]``, at ``where[i]`` in 0 … 1; −1: free."""
     space, rate, queue = make_space(model), np.empty(model.blocks.shape[0]), np.empty((QUEUE + 1, max(qa.shape[1], 2)))
     for i in range(start, stop):
+        forget(space)
         for end in range(2):  # the ends first, as pieces of no length
             queue[end, 0], queue[end, 1] = float(end), float(end)
         queue[2, 0], queue[2, 1] = 0.0, 1.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._jit import kernel
-from .collide import block_rates, make_space, node_gap, pair_gap, place
+from .collide import block_rates, forget, make_space, node_gap, pair_gap, place
 
 
 @kernel(borrow=True)
@@ -17,6 +17,7 @@ def ahead(model, space, rate, margin, tolerance, wanted):
     """
     pairs, arrays, poses, shapes = model.pairs, model.shapes, space.poses, space.shapes
     memory, ws, big, stack = space.memory, space.ws, space.big, space.stack
+    space.used[0] = 1.0
     blocks, nodes, balls = model.blocks, model.nodes, space.balls
     part, near = wanted, margin + tolerance
     for block in range(blocks.shape[0]):
@@ -43,6 +44,7 @@ def sweep(model, qa, qb, margin, tolerance, start, stop, until, pair):
     n = qa.shape[1]
     space, rate, q = make_space(model), np.empty(model.blocks.shape[0]), np.empty(n)
     for i in range(start, stop):
+        forget(space)
         block_rates(model, qa[i], qb[i], rate)
         t = 0.0
         while True:

@@ -19,7 +19,8 @@ SAME = 1e-6  # branches nearer to each other than this in every joint are one: t
 def refine(chain, targets, owner, first, last, x, most, error):
     """Newton steps on lanes for the candidates first … of ``x (B, k)``, which aim at ``targets[owner[b]] (12)``.
 
-    Blocks with a lane above `TIGHT` move, at most *most* times; ``error (B)`` is the larger of distance and angle.
+    Those above `TIGHT` move, at most *most* times, each as if it were alone; ``error (B)`` is the larger of distance
+    and angle.
     """
     k = x.shape[1]
     q = np.zeros(k * L)
@@ -45,7 +46,7 @@ def refine(chain, targets, owner, first, last, x, most, error):
                     distance += w[ERR + r * L + l] ** 2
                     angle += w[ERR + (3 + r) * L + l] ** 2
                 e = math.sqrt(max(distance, angle))
-                if turn_number == 0 or e < error[block + l]:
+                if turn_number == 0 or TIGHT < error[block + l] > e:  # lanes that are done wait for the others
                     error[block + l] = e
                     for c in range(k):
                         x[block + l, c] = q[c * L + l]

@@ -141,6 +141,7 @@ def settle(model, lanes, space, a, b, both, first, stride, count, margin, rate, 
     memory, ws, big, stack = space.exact.memory, space.exact.ws, space.exact.big, space.exact.stack
     flags, middle, state = space.lanes.flags, space.middle, space.state
     marks, half = flags[L : 2 * L], flags[2 * L : 3 * L]
+    space.exact.used[0] = 1.0
     while True:
         lane = middle_marked(marks)
         if lane < 0:
