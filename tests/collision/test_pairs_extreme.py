@@ -76,11 +76,40 @@ def places(a: Convex, b: Convex, scale: float, rng: np.random.Generator) -> np.n
     return np.array(out)
 
 
+def thin(stretch: float, long: float) -> dict[str, Convex]:
+    """Things that are *long*, and thinner by *stretch*: sheets, strips, rods and needles, and a ball and a box."""
+    rng, t = np.random.default_rng(0), long / stretch
+    return {
+        "ball": Convex.sphere(0.2 * long),
+        "box": Convex.box([0.3 * long, 0.2 * long, 0.5 * long]),
+        "bar": Convex.box([t, 1.3 * t, long]),
+        "sheet": Convex.box([long, 0.7 * long, t]),
+        "strip": Convex.box([long, 0.1 * long, t]),
+        "rod": Convex.cylinder(0.5 * t, long),
+        "disc": Convex.cylinder(0.5 * long, t),
+        "needle": Convex.capsule(0.5 * t, long),
+        "tip": Convex.cone(0.5 * t, long),
+        "leaf": Convex.ellipsoid([0.5 * long, 0.3 * long, 0.5 * t]),
+        "splinter": Convex.hull(rng.normal(size=(40, 3)) * [0.25 * t, 0.25 * t, 0.25 * long]),
+        "flake": Convex.hull(rng.normal(size=(40, 3)) * [0.25 * long, 0.25 * long, 0.25 * t]),
+        "wire": Convex.hull([[0.0, 0.0, -0.5 * long], [0.0, 0.0, 0.5 * long]]),
+    }
+
+
 @pytest.mark.parametrize(("scale", "stretch"), [(1.0, 1.0), (1e-6, 1.0), (1e3, 1.0), (1.0, 100.0)])
 def test_hard_places_have_certified_answers(scale: float, stretch: float) -> None:
+    certify(shapes(scale, stretch), scale, scale * stretch)
+
+
+@pytest.mark.parametrize(("stretch", "long"), [(100.0, 2.0), (100.0, 0.01), (1000.0, 10.0), (1000.0, 0.1)])
+def test_thin_things_have_certified_answers(stretch: float, long: float) -> None:
+    kinds = thin(stretch, long)
+    certify(kinds, long, long)
+    certify(kinds, long / stretch, long)  # gaps and offsets within the thickness
+
+
+def certify(kinds: dict[str, Convex], scale: float, size: float) -> None:
     rng = np.random.default_rng(1)
-    kinds = shapes(scale, stretch)
-    size = scale * stretch
     spread = rng.normal(size=(20, 3))
     spread = np.concatenate([spread / np.linalg.norm(spread, axis=1)[:, None], np.eye(3), -np.eye(3)])
     for i, (name_b, b) in enumerate(kinds.items()):
@@ -93,8 +122,6 @@ def test_hard_places_have_certified_answers(scale: float, stretch: float) -> Non
                 for numbers in (d, found.points, n):
                     assert np.isfinite(numbers).all(), what
                 np.testing.assert_allclose(np.linalg.norm(n, axis=1), 1.0, atol=1e-9, err_msg=what)
-                if stretch > 1.0:  # where long and thin shapes just touch, normals and depths are not certified
-                    continue
                 planes = between_planes(a, b, TA, TB, n)
                 np.testing.assert_allclose(d, planes, atol=1e-9 * size, rtol=1e-9, err_msg=what)
                 apart = found.points[:, 0] - found.points[:, 1]

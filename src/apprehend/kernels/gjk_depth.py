@@ -18,6 +18,7 @@ MAX_POINTS = 260
 MAX_FACES = 1024
 MAX_TURNS = 1000
 FLAT = 1e-12
+SIDES = 4  # directions from which the depth of a round shape is searched anew, at most
 
 NORMAL = 0  # columns of a face: outward unit normal and distance from the origin, its corners, an edge of the rim
 CORNER = 4
@@ -149,8 +150,11 @@ def depth(ints, floats, points, graph, a, b, ws, n, big):
         for c in range(9):
             P[i, c] = ws[i, c]
     dim = tetrahedron(ints, floats, points, graph, a, b, ws, P, n, ws[4])
-    if dim < 4:
-        return 0.0, True  # flat: the nearest points stay what they are
+    if dim < 4:  # flat: the nearest points stay what they are, and the plane may pass the origin at a distance
+        gap = axis[0] * P[0, 0] + axis[1] * P[0, 1] + axis[2] * P[0, 2]
+        if gap < 0.0:
+            axis[0], axis[1], axis[2] = -axis[0], -axis[1], -axis[2]
+        return -abs(gap), abs(gap) <= FLAT * (floats[a, 7] + floats[b, 7])
     inner = ws[4]
     for c in range(3):
         inner[c] = 0.25 * (P[0, c] + P[1, c] + P[2, c] + P[3, c])
@@ -183,7 +187,39 @@ def depth(ints, floats, points, graph, a, b, ws, n, big):
     deepest(P, F, faces, best, ws)
     if best - low <= 1e-9 * best + 1e-13 * size:
         return best, True
-    return polish(ints, floats, points, graph, a, b, ws, P[0], best), False
+    best = polish(ints, floats, points, graph, a, b, ws, P[0], best)
+    return other_sides(ints, floats, points, graph, a, b, ws, F, faces, P[0], best), False
+
+
+@kernel(fast=False, borrow=True)
+def other_sides(ints, floats, points, graph, a, b, ws, F, faces, row, best):
+    """As `polish` from faces that look elsewhere and may be less deep: there are several in shapes around one centre."""
+    axis, kept, tried = ws[AXIS], ws[4], ws[5 : 5 + SIDES]
+    for turn in range(SIDES):
+        for c in range(3):
+            tried[turn, c] = kept[c] = axis[c]
+        near, low = -1, 1e300
+        for f in range(faces):
+            x, y, z = F[f, 0], F[f, 1], F[f, 2]
+            new = F[f, 3] < best * (1.0 - 1e-12)
+            for i in range(turn + 1):
+                new = new and x * tried[i, 0] + y * tried[i, 1] + z * tried[i, 2] > -0.9
+            if new:
+                difference(ints, floats, points, graph, a, b, x, y, z, ws, row)
+                h = x * row[0] + y * row[1] + z * row[2]
+                if h < low:
+                    near, low = f, h
+        if near < 0:
+            break
+        for c in range(3):
+            axis[c] = -F[near, c]
+        low = polish(ints, floats, points, graph, a, b, ws, row, low)
+        if low < best:
+            best = low
+        else:
+            for c in range(3):
+                tried[turn, c], axis[c] = axis[c], kept[c]
+    return best
 
 
 @kernel(fast=False, borrow=True)

@@ -18,6 +18,32 @@ CLOSE = 1e-8
 """Below this share of the size the plane that the nearest points make is tried before it is believed."""
 
 SETTLE = 8  # steps, at most
+SETTLE_DEEP = 40  # the same where they overlap
+
+
+@kernel(fast=False, borrow=True)
+def farther(ints, floats, points, graph, a, b, ws, ux, uy, uz, lower, row):
+    """The best direction on the way from ``ws[SPARE, 3:6]`` to u, whose plane has gap *lower*, and on in longer steps.
+
+    Where the depth hardly changes from direction to direction a single step is short.
+    """
+    fromx, fromy, fromz = ws[SPARE, 3], ws[SPARE, 4], ws[SPARE, 5]
+    dx, dy, dz = ux - fromx, uy - fromy, uz - fromz
+    step = 1.0
+    for _ in range(30):
+        x, y, z = ux + step * dx, uy + step * dy, uz + step * dz
+        norm = math.sqrt(x * x + y * y + z * z)
+        if norm < 1e-3:
+            break
+        x, y, z = x / norm, y / norm, z / norm
+        difference(ints, floats, points, graph, a, b, -x, -y, -z, ws, row)
+        gap = x * row[0] + y * row[1] + z * row[2]
+        if gap <= lower:
+            break
+        lower = gap
+        ux, uy, uz = x, y, z
+        step *= 2.0
+    return ux, uy, uz
 
 
 @kernel(fast=False, borrow=True)
@@ -39,9 +65,9 @@ def settle(ints, floats, points, graph, a, b, ws, distance):
     for c in range(6):
         kept[c] = near[c]
     answer, least, away = distance, 1e300, 0.02 * size
-    for _ in range(SETTLE):
+    for _ in range(SETTLE if distance > 0.0 else SETTLE_DEEP):
         nx, ny, nz = normal[3], normal[4], normal[5]
-        shift = away + max(-distance, 0.0)
+        shift = away + max(-answer, 0.0)
         rel[9], rel[10], rel[11] = place[0] - shift * nx, place[1] - shift * ny, place[2] - shift * nz
         axis[0], axis[1], axis[2] = nx, ny, nz
         rows, _, upper = gjk(ints, floats, points, graph, a, b, ws, 1e300, 0.0, 1e-15)
@@ -54,17 +80,21 @@ def settle(ints, floats, points, graph, a, b, ws, distance):
         lower = ux * row[0] + uy * row[1] + uz * row[2]
         reach = math.sqrt(px * px + py * py + pz * pz)
         error = abs(px - lower * ux) + abs(py - lower * uy) + abs(pz - lower * uz)
-        if error < least and (distance > 0.0 or lower >= distance - fine):
+        if (error < least and (distance > 0.0 or lower >= answer - fine)) or lower > answer + fine:
             least = error
-            answer = lower if lower < 0.0 and (distance < 0.0 or lower > -reach or error < reach) else reach
+            held = lower > 0.0 and reach - lower <= 1e-10 * size  # else the plane is what is known
+            beyond = lower <= -reach and error >= reach and distance >= 0.0
+            answer = reach if held or beyond else lower
             witnesses(ws, rows)
             for c in range(3):
                 normal[c] = axis[c] / upper
                 kept[c], kept[3 + c] = near[c], near[3 + c] + shift * normal[3 + c]
         if reach - abs(lower) <= fine:
             break
+        if distance <= 0.0:
+            ux, uy, uz = farther(ints, floats, points, graph, a, b, ws, ux, uy, uz, lower, row)
         normal[3], normal[4], normal[5] = ux, uy, uz
-        away *= 0.1
+        away = max(0.1 * away, -1e-6 * answer)
     for c in range(3):
         axis[c] = normal[c]
     for c in range(6):
