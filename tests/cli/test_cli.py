@@ -210,3 +210,36 @@ def test_exit_codes_and_units_are_in_the_help() -> None:
     assert "Exit code 0: a path, checked; 1: there is none" in told
     assert "roll,pitch,yaw in rad" in told
     assert "[default: (as at the start)]" in told
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("fk ur5e --q nan,0,0,0,0,0", "is 'nan,0,0,0,0,0'; expected 6 finite numbers"),
+        ("jacobian ur5e tool0 --picture x.nope", "--picture is x.nope; expected a name that ends in .png or .svg or"),
+        ("ik ur5e tool0 --xyz 0.4,0.2,0.4 --picture none/x.png", "but there is no folder"),
+        ("ik ur5e tool0 --xyz 0.4,0.2,0.4 --near 1", "--near (joints shoulder_pan_joint"),
+        ("reach ur5e tool0 --picture x.nope", "expected a name that ends in"),
+        ("reach ur5e tool0 --rpy 1,2,3", "give --xyz"),
+        ("plan ur5e --goal home --rpy 1,2,3", "give --xyz"),
+        ("trajectory w.csv --velocity 1 --acceleration 1 --deviation 1", "give --straight"),
+        ("trajectory w.csv --velocity 1 --acceleration 1 --dt 1e-12 --out x.csv", "choose a larger dt"),
+        ("grasp plan robotiq_2f_85 nothing", "no household body named 'nothing'"),
+        ("pick mug --out w.csv", "give a directory"),
+        ("view mug --units mm --picture x.png", "--units goes with a mesh file"),
+    ],
+)
+def test_mistakes_are_found_before_anything_is_computed(
+    line: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from apprehend.cli import main
+
+    (tmp_path / "w.csv").write_text("0,0\n1,1\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["apprehend", *line.split()])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    said = capsys.readouterr()
+    assert stop.value.code == 2, said
+    assert message in " ".join(said.err.split())
+    assert not list(tmp_path.glob("x.*"))

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .console import console, print_json
-from .options import CutLoops, Degrees, Joints, Json, RobotName, load
+from .options import PICTURES, CutLoops, Degrees, Joints, Json, RobotName, check_file, load
 
 
 def command(
@@ -60,6 +60,7 @@ def jacobian(
     from ..kinematics import draw, manipulability
     from .values import joints
 
+    check_file("--picture", picture, *PICTURES)
     model = load(robot, cut_loops)
     values = joints(q, model, deg)
     J = model.jacobian(values, frame, reference)

@@ -149,12 +149,15 @@ def plan(
 
     from .. import grasp
     from ..bodies import HOUSEHOLD, Body
+    from ..errors import unknown_name
     from ..kinematics import Hand
 
     if body in HOUSEHOLD:
         thing = Body.household(body) if mass is None else Body.household(body).with_(mass=mass)
-    else:
+    elif Path(body).suffix:
         thing = load_body(body, mass=mass, units=units)
+    else:
+        unknown_name("household body", body, HOUSEHOLD, "the catalogue (and it has no ending of a mesh file)")
     gripper = Hand.load(hand)
     found = grasp.plan(gripper, thing, n=n, rng=np.random.default_rng(seed), friction=friction, method=method)
     if as_json:

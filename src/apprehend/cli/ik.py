@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .console import console, print_json
+from .options import check_file
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -45,9 +46,11 @@ def command(
     from ..kinematics import Robot
     from .values import joints, pose
 
+    check_file("--picture", picture, ".png")
+    check_file("--curves", curves, ".png")
     model = Robot.load(robot)
     T = pose(xyz, rpy, deg)
-    q0 = joints(near, model, deg) if near is not None else None
+    q0 = joints(near, model, deg, "--near") if near is not None else None
     answer = ik.solve(model, T, frame, q0, n_solutions=max(n, 2), rng=np.random.default_rng(seed))
     value = None if redundancy is None else redundancy * (DEGREE if deg else 1.0)
     open_joint, intervals, known = _closed_form(model, T, frame, value, every, q0)

@@ -34,6 +34,19 @@ def load_body(path: str | Path, **options: Any) -> Body:
         raise MeshError(re.sub(r"units='(\w+)'", r"--units \1", str(error))) from error
 
 
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def check_file(option: str, path: Path | None, *endings: str) -> None:
+    """Refuse the name of a file that cannot be written, before anything is computed."""
+    from ..errors import InputError
+
+    if path is not None and not path.name.lower().endswith(endings):
+        raise InputError(f"{option} is {path}; expected a name that ends in {' or '.join(endings)}")
+    if path is not None and not path.absolute().parent.is_dir():
+        raise InputError(f"{option} is {path}, but there is no folder {path.absolute().parent}")
+
+
 def is_scene(path: Path) -> bool:
     """Whether a file describes a scene; what ends in .toml may also be the table of a robot. Missing ones do."""
     return path.suffix == ".toml" and (not path.exists() or "[robot]" in path.read_text(encoding="utf-8"))

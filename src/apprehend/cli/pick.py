@@ -42,10 +42,13 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="print the verdict and the steps as JSON")] = False,
 ) -> int:
     """Exit code 0: the object stands at its goal; 1: it does not (the verdict says why); 2: the input is wrong."""
+    from ..errors import InputError
     from ..process import pick_and_place
     from .progress import Checklist, silence
     from .warm import warm_up
 
+    if out is not None and out.is_file():
+        raise InputError(f"--out is {out}, which is a file; give a directory")
     start = time.perf_counter()
     with silence() if as_json else Checklist(console) as observer:
         observer.started("scene", "Build the scene")

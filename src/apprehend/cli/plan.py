@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import console, print_json
-from .options import Browser, Json, Port, is_scene
+from .options import Browser, Json, Port, check_file, is_scene
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -64,7 +64,10 @@ def command(
     from ..collision import CollisionModel
     from ..errors import InputError
 
-    check_names(out, picture)
+    check_file("--out", out, ".json", ".csv")
+    check_file("--picture", picture, ".png")
+    if rpy is not None and not xyz:
+        raise InputError("--rpy turns the goal of --xyz; give --xyz, or drop --rpy")
     scene, robot = read(what)
     rng = np.random.default_rng(seed)
     q0 = posture(start, "--start", robot, deg)
@@ -100,17 +103,6 @@ def command(
     return 0 if result.success else 1
 
 
-def check_names(out: Path | None, picture: Path | None) -> None:
-    """Refuse names of files that cannot be written, before anything is computed."""
-    from ..errors import InputError
-
-    for name, path, endings in (("--out", out, (".json", ".csv")), ("--picture", picture, (".png",))):
-        if path is not None and path.suffix.lower() not in endings:
-            raise InputError(f"{name} is {path}; expected a name that ends in {' or '.join(endings)}")
-        if path is not None and not path.absolute().parent.is_dir():
-            raise InputError(f"{name} is {path}, but there is no folder {path.absolute().parent}")
-
-
 def read(what: str) -> tuple[Scene | None, Robot]:
     """The scene and its robot, or a robot alone."""
     from ..collision import Scene
@@ -133,10 +125,9 @@ def posture(text: str, name: str, robot: Robot, deg: bool, base: Array | None = 
         return robot.home.copy()
     if "=" not in text:
         try:
-            return joints(text, robot, deg)
+            return joints(text, robot, deg, name)
         except InputError as error:
-            what = f"{str(error).replace('--q', name)}, or 'home', or joint=value pairs"
-            raise InputError(what) from error
+            raise InputError(f"{error}, or 'home', or joint=value pairs") from error
     q = robot.home.copy() if base is None else base.copy()
     for pair in text.split(","):
         joint, _, value = pair.partition("=")

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from .console import console, print_json
+from .options import PICTURES, check_file
 
 
 def command(
@@ -29,10 +30,14 @@ def command(
     import numpy as np
 
     from ..conventions import DEGREE
+    from ..errors import InputError
     from ..kinematics import Robot
     from ..workspace import ReachabilityMap
     from .values import pose
 
+    check_file("--picture", picture, *PICTURES)
+    if rpy is not None and xyz is None:
+        raise InputError("--rpy turns the pose of --xyz; give --xyz, or drop --rpy")
     model = Robot.load(robot)
     target = None if xyz is None else pose(xyz, rpy, deg)
     with console.status("compiling") as status:

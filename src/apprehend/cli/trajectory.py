@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import console, print_json
+from .options import PICTURES, check_file
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -41,6 +42,10 @@ def command(
     from ..errors import InputError, UnsuccessfulError
     from ..kinematics import Robot
 
+    check_file("--out", out, ".json", ".ros.json", ".csv")
+    check_file("--picture", picture, *PICTURES)
+    if deviation != 0.0 and not straight:
+        raise InputError("--deviation rounds the corners of straight segments; give --straight, or drop it")
     points = tj.read_waypoints(waypoints)
     arm = Robot.load(robot) if robot else None
     names = arm.joint_names if arm is not None else None

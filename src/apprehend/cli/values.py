@@ -22,14 +22,16 @@ def vector(text: str, name: str, n: int) -> Array:
         raise InputError(f"{name} is {text!r}; expected {n} numbers with commas between them") from error
     if values.size != n:
         raise InputError(f"{name} has {values.size} numbers; expected {n}")
+    if not np.isfinite(values).all():
+        raise InputError(f"{name} is {text!r}; expected {n} finite numbers")
     return values
 
 
-def joints(text: str | None, robot: Robot, deg: bool) -> Array:
+def joints(text: str | None, robot: Robot, deg: bool, option: str = "--q") -> Array:
     """Joint values in the order of ``robot.joint_names``; home where nothing is given. *deg*: angles in degrees."""
     if text is None:
         return robot.home.copy()
-    q = vector(text, f"--q (joints {', '.join(robot.joint_names)})", robot.n)
+    q = vector(text, f"{option} (joints {', '.join(robot.joint_names)})", robot.n)
     if deg:
         turning = np.array([j.type.value != "prismatic" for j in robot.description.free_joints])
         q = np.where(turning, q * DEGREE, q)

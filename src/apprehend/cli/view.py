@@ -33,7 +33,7 @@ def command(
             "simplified, surface; of a body also voxels, field, section, silhouette",
         ),
     ] = None,
-    count: Annotated[int | None, typer.Option(help="most shapes (or faces) of the model")] = None,
+    count: Annotated[int | None, typer.Option(min=1, help="most shapes (or faces) of the model")] = None,
     resolution: Annotated[float | None, typer.Option(help="side of voxels, spacing of a field, in m")] = None,
     units: Units = None,
     view: Annotated[str | None, typer.Option(help="draw in the plane, as seen from: front, side, top")] = None,
@@ -48,6 +48,7 @@ def command(
     """Serve a page until interrupted, or write a picture or the model."""
     from .. import viewer
     from ..bodies import FORMATS, HOUSEHOLD, Body
+    from ..errors import InputError
     from ..kinematics import Robot
 
     path = Path(what)
@@ -57,6 +58,8 @@ def command(
     elif path.suffix.lower() in FORMATS:
         _body(load_body(path, units=units), model, count, resolution, view, picture, save, page)
     elif what in HOUSEHOLD:
+        if units is not None:
+            raise InputError(f"--units goes with a mesh file; the household body {what!r} is in m")
         _body(Body.household(what), model, count, resolution, view, picture, save, page)
     elif is_scene(path):
         _scene(path, model, picture, page)

@@ -14,6 +14,9 @@ from ..errors import InputError
 from .limits import _ORDERS, LimitReport, Limits, LimitStatus
 from .piecewise import Piecewise
 
+MOST_SAMPLES = 10_000_000
+"""More are refused: a step in the wrong unit, rather than a file of gigabytes."""
+
 
 @dataclass(frozen=True)
 class Samples:
@@ -59,6 +62,11 @@ class Trajectory(Piecewise):
         if dt is not None:
             if not dt > 0.0:
                 raise InputError(f"dt is {dt}; expected a positive time in seconds")
+            if self.duration / dt > MOST_SAMPLES:
+                raise InputError(
+                    f"dt is {dt} s, which makes {self.duration / dt:.3g} samples of {self.duration:.4g} s; at most "
+                    f"{MOST_SAMPLES:.0e} are allowed: choose a larger dt"
+                )
             steps = int(np.ceil(self.duration / dt - 1e-9))
             t = np.append(t0 + dt * np.arange(max(steps, 1)), t1)
         else:
