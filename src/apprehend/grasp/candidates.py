@@ -26,7 +26,7 @@ class PlanStatus(Status):
     NO_OPPOSITE_SIDES = "no two sides of the body face each other within the friction cones"
     NO_APPROACH = "no closing line can be approached from the directions that are asked for"
     NO_ROOM = "the open hand has no room: it would hit the body, or the table, wherever it could close"
-    NO_CONTACT = "the pads would not meet opposite surfaces firmly enough"
+    NO_CONTACT = "the pads would not meet opposite surfaces firmly enough wherever the open hand has room"
     NO_CLOSURE = "wherever the fingers touch, the contacts do not resist every wrench"
     OUT_OF_REACH = "no set of contacts that closes is within the reach of the fingers"
     TOO_FEW = "too few links touch the body where the fingers close"
