@@ -38,7 +38,7 @@ def signed_distance(a: object, b: object, T_a: ArrayLike, T_b: ArrayLike) -> Sep
 
     - Convex cores: Gilbert, Johnson & Keerthi 1988 where they are apart, the expanding polytope of van den Bergen 2001
       where they overlap: exact to rounding between polytopes, to about 1e-11 of the size with curved ones (where a
-      small thing sits at the centre of a round one of equal widths, its depth may be 1e-5 of the size too large).
+      small thing sits at the centre of a round one of equal widths, its depth may be 3e-5 of the size too large).
     - Unions and clouds: the least distance over their parts; where parts overlap, the depth of the deepest pair.
     - Fields: the least value of the interpolated field on the other shape, by branch and bound to 1 % of the spacing
       or half a per cent of itself; the depth is that of the deepest point. It is as exact as the samples; beyond the
