@@ -6,6 +6,7 @@ Every message is built from facts: what was given, where it stood, what is allow
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable
 from typing import Never
 
@@ -39,6 +40,35 @@ class MissingDependencyError(ApprehendError, ImportError):
 
 class UnsuccessfulError(ApprehendError, RuntimeError):
     """Raised by ``Result.require_success()``: the computation answered, but not with a success."""
+
+
+MADE_BY = {
+    "Robot": "Robot.load(name_or_file)",
+    "Hand": "Hand.load(name_or_file)",
+    "Body": "Body.load(file) or Body.household(name)",
+    "Scene": "Scene.load(file) or Scene.tabletop(robot, body=...)",
+    "CollisionModel": "CollisionModel(robot, scene)",
+    "Generator": "numpy.random.default_rng(seed)",
+}
+"""How to get what a function expects."""
+
+
+def expect(value: object, kind: str, name: str) -> None:
+    """Raise `InputError` unless the argument *name* is an object of class *kind*, one of `MADE_BY`."""
+    if type(value).__name__ != kind and all(c.__name__ != kind for c in type(value).__mro__):
+        raise InputError(f"{name} is {described(value)}; expected a {kind}: {MADE_BY[kind]}")
+
+
+def expect_path(value: object, name: str, what: str) -> None:
+    """Raise `InputError` unless the argument *name* can be a name or the path of a file."""
+    if not isinstance(value, str | os.PathLike):
+        raise InputError(f"{name} is {described(value)}; expected {what}")
+
+
+def described(value: object) -> str:
+    """A value as a message shows it: short ones themselves, of others the type."""
+    short = isinstance(value, str | int | float) or value is None
+    return repr(value) if short and len(repr(value)) < 80 else f"a {type(value).__name__}"
 
 
 def suggestion(name: str, known: Iterable[str], limit: int = 3) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, as_shaped
-from ..errors import InputError, MeshError
+from ..errors import InputError, MeshError, expect_path
 from . import rest
 from .convex import ConvexParts, Piece, decompose
 from .load import check_mesh, read_mesh
@@ -85,6 +85,7 @@ class Body(Models):
         Raises `MeshError` if the file is missing, unreadable, too large, flat, or cannot be made to enclose a volume,
         and `InputError` for a mass, density or friction that no body has.
         """
+        expect_path(path, "path", "the path of a mesh file")
         path = Path(path)
         vertices, faces = read_mesh(path, units)
         body = cls.from_mesh(

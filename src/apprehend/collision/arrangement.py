@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, as_pose
-from ..errors import InputError, unknown_name
+from ..errors import InputError, expect, unknown_name
 from ..kernels.collide import CollideModel
 from ..kernels.sphere import SphereModel
 from ..kinematics import Robot
@@ -51,6 +51,9 @@ class Arrangement:
         allowed: Iterable[tuple[str, str]] = (),
         geometry: Mapping[str, Sequence[Convex]] | None = None,
     ) -> None:
+        expect(robot, "Robot", "robot")
+        if scene is not None:
+            expect(scene, "Scene", "scene")
         if clearance is None:
             clearance = scene.clearance if scene is not None else 0.0
         if not (math.isfinite(clearance) and clearance >= 0.0):

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, as_pose, as_vector
 from ..conventions import GRAVITY
-from ..errors import InputError, unknown_name
+from ..errors import InputError, expect_path, unknown_name
 from ..kinematics import Robot
 from ..kinematics.mounting import mounting
 from ..robots.description import Description, JointType
@@ -260,6 +260,7 @@ class Scene:
     @staticmethod
     def load(path: str | Path) -> Scene:
         """Read a scene from TOML; unknown tables and keys are errors that name file, table and key."""
+        expect_path(path, "path", "the path of a scene file (.toml)")
         from .scene_file import load
 
         return load(Path(path))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, as_pose
-from ..errors import InputError
+from ..errors import InputError, expect
 from ..kinematics import Robot
 from ..robots import load_description
 from .scene import AUTO, DEFAULT_HAND, Box, Placed, RobotSource, Scene, end_link, has_hand
@@ -91,6 +91,7 @@ def resting(body: Body, x: float, y: float, z: float = 0.0, *, yaw: float = 0.0,
     where that is stable, else the most probable one. With *yaw* = 0 (rad, about the vertical) the rest is the
     smallest rotation that brings it about.
     """
+    expect(body, "Body", "body")
     poses = body.stable_poses()
     if choose is None:
         ups = [pose.up[2] for pose in poses]

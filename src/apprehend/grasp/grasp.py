@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, as_own, as_shaped
 from ..bodies import Body
-from ..errors import InputError
+from ..errors import InputError, expect
 from ..kernels.hull_support import BOX, SAME
 from .ball import Generators
 from .closure import Closure, force_closure, form_closure
@@ -50,6 +50,8 @@ class Grasp:
         reference: ArrayLike | None = None,
         length: float | None = None,
     ) -> None:
+        if body is not None:
+            expect(body, "Body", "body")
         if isinstance(contacts, Contact | Patch):
             raise InputError("contacts is a single contact; expected a sequence of them: [contact]")
         contacts = list(contacts)

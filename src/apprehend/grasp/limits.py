@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, as_array, as_vector
-from ..errors import InputError
+from ..errors import InputError, described
 
 if TYPE_CHECKING:
     from .grasp import Grasp
@@ -37,7 +37,9 @@ NO_LIMITS = Limits()
 
 
 def check_limits(limits: Limits) -> None:
-    """Raise `InputError` for limits of normal forces that are negative or NaN."""
+    """Raise `InputError` for limits of normal forces that are negative or NaN, or for another thing."""
+    if not isinstance(limits, Limits):
+        raise InputError(f"limits is {described(limits)}; expected apprehend.grasp.Limits(normal=...)")
     for name, value in (("normal", limits.normal), ("total", limits.total)):
         if value is not None and not (as_array(value, f"limits.{name}", finite=False) >= 0.0).all():
             raise InputError(f"limits.{name} is {value}; expected numbers from zero on: it bounds a normal force")

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import choice
 from ..bodies import Body
+from ..errors import expect
 from ..kinematics import Hand
 from .candidates import GraspPlan
 from .hand_settings import HandSettings, checked_hand
@@ -79,6 +80,8 @@ def plan(
     body's `torsional_friction`. The answer is the same for the same state of *rng*. Raises `InputError` for arguments
     without meaning and `DescriptionError` if the hand has neither a jaw nor two fingers with geometry.
     """
+    for value, kind, name in ((hand, "Hand", "hand"), (body, "Body", "body"), (rng, "Generator", "rng")):
+        expect(value, kind, name)
     choice(method, "method", ("both", "inverse", "closing"))
     if not hand.is_jaw:
         given = HandSettings(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, BoolArray, IntArray, as_pose, as_shaped
-from ..errors import InputError
+from ..errors import InputError, expect
 from ..kernels import ik_branches as kernels
 from ..kernels.chain import ChainModel
 from ..kernels.ik_chain import IKChain
@@ -187,6 +187,7 @@ def branches(
     With *limits* only branches within the position limits are returned, on the turn nearest to *q0* ``(..., n)`` or to
     the middle of the limits; else all, in (−π, π]. Coordinates that do not move the frame keep *q0* or home.
     """
+    expect(robot, "Robot", "robot")
     frame = tip_of(robot) if frame is None else frame
     arm = _arm(robot, frame)
     poses, fill, shape = read_targets(robot, as_pose(T, "T"), q0)

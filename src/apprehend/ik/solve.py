@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, BoolArray, IntArray, as_array, as_pose, as_vector
-from ..errors import InputError
+from ..errors import InputError, expect
 from ..kernels.chain import chain_poses
 from ..kernels.ik_seeds import residuals
 from ..kinematics import Robot
@@ -73,6 +73,7 @@ def solve(
     Coordinates that do not move *frame* keep their value of *q0*, or of ``robot.home``. Joints that may make a whole
     turn are returned on the turn nearest to *q0*, or to the middle of their limits.
     """
+    expect(robot, "Robot", "robot")
     whole(n_solutions, "n_solutions")
     whole(max_starts, "max_starts")
     if not distinct > 0.0:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, as_array, as_pose, as_shaped, spread
-from ..errors import InputError
+from ..errors import InputError, expect
 from ..kernels.ik_faults import OUTSIDE
 from ..kernels.ik_step import steps
 from ..kernels.ik_tasks import JOINTS, TaskList
@@ -249,6 +249,7 @@ def step(
     velocity of the previous step, is given. Then every step also leaves room to brake in front of the position
     limits. Targets of the tasks may be batched like *q*. What does not change with the targets is kept between calls.
     """
+    expect(robot, "Robot", "robot")
     dt, square = _settings(dt, damping)
     program = assemble(robot, tasks, _joint_vectors(robot, q)[0])
     return _advance(robot, tasks, program, q, velocity, dt, square)

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..errors import ApprehendError, DescriptionError, unknown_name
+from ..errors import ApprehendError, DescriptionError, expect, unknown_name
 from ..robots.branches import divide
 from ..robots.combine import subtree
 from ..robots.description import Description, Joint, JointType
@@ -57,6 +57,7 @@ class Hand:
         link after a serial chain of moving joints at which the tree divides into two or more moving branches. Raises
         `DescriptionError` where there is no such link, or several arms.
         """
+        expect(robot, "Robot", "robot")
         description = robot.description
         if root_link is None:
             root_link = description.hand or _end_of_arm(description)

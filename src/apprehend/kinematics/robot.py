@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, as_pose, as_shaped, choice, is_complex
-from ..errors import InputError, unknown_name
+from ..errors import InputError, expect, unknown_name
 from ..kernels import chain as chain_kernels
 from ..kernels import single as single_kernels
 from ..kernels import tree as tree_kernels
@@ -108,7 +108,9 @@ class Robot:
         """
         from .. import robots
 
-        tool = other.description if isinstance(other, Robot) else other
+        tool: Any = other.description if isinstance(other, Robot) else other
+        if not isinstance(tool, robots.Description):
+            expect(tool, "Robot", "other")
         offset = None if pose is None else as_pose(pose, "pose")
         joined = robots.attach(self.description, tool, at, pose=offset, prefix=prefix)
         return Robot(joined, base=self.base)

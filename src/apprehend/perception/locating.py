@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, as_pose, as_shaped
 from ..bodies import Body
-from ..errors import InputError
+from ..errors import InputError, expect
 from ..result import Result, Status
 from .camera import DepthImage, Noise
 from .evaluate import Fit, Window, fit, windows
@@ -97,6 +97,7 @@ def locate(
 
     Raises `InputError` for no view, a region that is not a box, or a guess that is not one pose.
     """
+    expect(body, "Body", "body")
     images = [views] if isinstance(views, DepthImage) else list(views)
     if not images:
         raise InputError("locate needs at least one depth image")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, BoolArray, IntArray, as_shaped
 from ..collision import CollisionModel, Touch
-from ..errors import InputError
+from ..errors import InputError, expect
 from ..kernels import collide_plan, plan_ends
 from ..kinematics import Robot
 from .constrained import ConstrainedSearch
@@ -56,6 +56,7 @@ def plan(
     The same *rng* state gives the same path, unless the time runs out. Raises `InputError` for arrays of the wrong
     shape; whatever the numbers lead to is in the answer's status.
     """
+    expect(model, "CollisionModel", "model")
     began = time.perf_counter()
     robot = model.robot
     q0 = as_shaped(start, "start", robot.n)

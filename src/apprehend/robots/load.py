@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..errors import DescriptionError
+from ..errors import DescriptionError, expect_path
 from . import catalogue
 from .combine import subtree, without
 from .description import Description
@@ -37,6 +37,7 @@ def load_description(
     ``"cut"`` for closed chains. An SRDF beside a URDF (same stem, or ``../srdf``) adds the pairs of links that may
     touch, and the posture named "home".
     """
+    expect_path(name_or_path, "name_or_path", "a name of the catalogue, or the path of a description file")
     text = str(name_or_path)
     path = Path(name_or_path)
     options = Options(packages, meshes, inertias, loops)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, as_shaped
-from ..errors import InputError
+from ..errors import InputError, expect
 from ..ik import solve
 from ..kernels import path_line as kernels
 from ..kinematics import Robot
@@ -116,6 +116,7 @@ def straight_line(
     robot: Robot, T0: ArrayLike, T1: ArrayLike, *, frame: str | None = None, **options: Any
 ) -> LineResult:
     """Fewest joint points such that *frame* stays near the straight line from *T0* to *T1*; see `along`."""
+    expect(robot, "Robot", "robot")
     return along(robot, Line(T0, T1), frame=frame, **options)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, BoolArray, choice
-from ..errors import InputError
+from ..errors import InputError, expect
 from ..kernels import reach_map as kernels
 from ..kernels.chain import ChainModel
 from ..kernels.reach_map import PoseGrid
@@ -46,6 +46,7 @@ class Settings:
         seed: int,
     ) -> Settings:  # fmt: skip
         """Check the arguments of `ReachabilityMap.build`."""
+        expect(robot, "Robot", "robot")
         for name, value in (("resolution", resolution), ("angle", angle), ("length", length)):
             if not value > 0.0 or (math.isinf(value) and name != "angle"):
                 raise InputError(f"{name} is {value}; expected a positive number")
