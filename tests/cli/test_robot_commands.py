@@ -118,7 +118,7 @@ def test_closed_chains_are_refused_or_cut(run: Any, tmp_path: Path) -> None:
         (("jacobian", "scara", "tool", "--reference", "word"), "reference is 'word'; expected one of 'spatial'"),
         (("jacobian", "scara", "tool", "--part", "zz"), "part is 'zz'; expected one of 'linear', 'angular', 'both'"),
         (("fk", "scara", "--q", "1,2,x,4"), "expected 4 numbers with commas between them"),
-        (("fk", "scara", "--q", "1,2,nan,4"), "q[2] is nan; every entry must be finite"),
+        (("fk", "scara", "--q", "1,2,nan,4"), "is '1,2,nan,4'; expected 4 finite numbers"),
         (("robots", "scara", "--frame", "base"), "no joint of robot 'scara' moves frame 'base'"),
     ],
 )
