@@ -10,6 +10,7 @@ from ..arrays import Array, IntArray
 from ..collision import CollisionModel
 from ..kernels import collide_plan, constrain_plan
 from .keeping import Constraints
+from .trees import Trees
 
 STRIDE, LEAST = 0.5, 0.03
 """Longest and shortest step before it is moved onto the constraint, in rad (and m)."""
@@ -17,36 +18,25 @@ STRIDE, LEAST = 0.5, 0.03
 WIDEST, NARROWEST = 0.5, 0.25
 """Bounds of a node's domain (see `kernels.constrain_plan.grow`) relative to the diagonal of the joint space."""
 
-FIRST_ROOM = 512
-"""Nodes that a tree has room for at first."""
-
 PORTION = 16
 """Random configurations between looks at the clock."""
 
 NOTHING = np.empty((0, 2))
 
 
-class ConstrainedSearch:
+class ConstrainedSearch(Trees):
     """Two trees between the start and the goals, all of whose motions keep the constraints and are free."""
 
     def __init__(
         self, model: CollisionModel, keep: Constraints, start: Array, goals: Array, low: Array, high: Array, most: int
     ):
-        self.low, self.high, self.most = low, high, max(most, 2 * len(goals) + 2)
+        super().__init__(start, goals, max(most, 2 * len(goals) + 2))
+        self.low, self.high = low, high
         across = float(np.linalg.norm(high - low))
         scale = np.array([STRIDE, LEAST, model.clearance, model.resolution, WIDEST * across, NARROWEST * across])
         self.task = constrain_plan.Task(model.compiled, model.lanes, keep.compiled, low, high, scale)
-        room = min(self.most, max(FIRST_ROOM, 4 * len(goals)))
-        self.nodes = np.empty((2, room, len(start)))
-        self.parent = np.full((2, room), -1, np.int64)
-        self.domain = np.full((2, room), np.inf)
-        self.count = np.zeros(2, np.int64)
         self.tally = np.zeros(3, np.int64)
-        self.samples = 0
-        self.compiling = 0.0  # seconds that went into compiling the kernels, in the first run of their kind
         for k, roots in enumerate((start[None], goals)):
-            self.nodes[k, : len(roots)] = roots
-            self.count[k] = len(roots)
             self._enter(model, keep, k, roots)
 
     def _enter(self, model: CollisionModel, keep: Constraints, k: int, roots: Array) -> None:
@@ -68,8 +58,7 @@ class ConstrainedSearch:
             status, used = self._run(self.count, samples, self.nodes[0], NOTHING, ends)
             self.samples += used
             if status == collide_plan.CONNECTED:
-                (a, _), (b, root) = (self._way(k, int(ends[k])) for k in (0, 1))
-                return np.concatenate([a[::-1], b[1:]]), root
+                return self._joined((int(ends[0]), int(ends[1])))
             full = status == collide_plan.FULL
             if full and self.nodes.shape[1] < self.most:
                 self._make_room()
@@ -107,17 +96,3 @@ class ConstrainedSearch:
             f"of {self.tally.sum()} steps {share[constrain_plan.LEFT]:.0f} % left the constraints and "
             f"{share[constrain_plan.BLOCKED]:.0f} % hit something"
         )
-
-    def _way(self, k: int, row: int) -> tuple[Array, int]:
-        rows = [row]
-        while self.parent[k, rows[-1]] >= 0:
-            rows.append(int(self.parent[k, rows[-1]]))
-        return self.nodes[k, rows], rows[-1]
-
-    def _make_room(self) -> None:
-        old = self.nodes.shape[1]
-        room = min(4 * old, self.most)
-        nodes, parent = np.empty((2, room, self.nodes.shape[2])), np.full((2, room), -1, np.int64)
-        domain = np.full((2, room), np.inf)
-        nodes[:, :old], parent[:, :old], domain[:, :old] = self.nodes, self.parent, self.domain
-        self.nodes, self.parent, self.domain = nodes, parent, domain

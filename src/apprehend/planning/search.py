@@ -11,6 +11,7 @@ from ..arrays import Array, as_shaped
 from ..collision import CollisionModel
 from ..errors import InputError
 from ..kernels import collide_plan
+from .trees import Trees
 
 STRIDE = 1.5
 """Largest step of a tree in joint space, in rad (and m)."""
@@ -18,29 +19,17 @@ STRIDE = 1.5
 WIDEST, LEAST = 0.5, 0.25
 """Bounds of a node's domain (see `kernels.collide_plan.grow`) relative to the diagonal of the joint space."""
 
-FIRST_ROOM = 512
-"""Nodes that a tree has room for at first."""
-
 SHORTCUTS = 100
 """Random shortcuts that are tried on a path."""
 
 
-class Search:
+class Search(Trees):
     """Two growing trees."""
 
     def __init__(self, model: CollisionModel, start: Array, goals: Array, max_nodes: int):
+        super().__init__(start, goals, max(max_nodes, len(goals) + 1))
         self.model = model
-        self.most = max(max_nodes, len(goals) + 1)
-        room = min(self.most, max(FIRST_ROOM, 2 * len(goals)))
-        self.nodes = np.empty((2, room, len(start)))
-        self.parent = np.full((2, room), -1, np.int64)
-        self.domain = np.full((2, room), np.inf)
-        self.count = np.array([1, len(goals)], np.int64)
-        self.nodes[0, 0] = start
-        self.nodes[1, : len(goals)] = goals
-        self.samples = 0
         self.chunk = 192
-        self.compiling = 0.0  # seconds that went into compiling the kernel, in the first run of its kind
 
     def grow(self, rng: np.random.Generator, low: Array, high: Array) -> int:
         """Try one more portion of random configurations."""
@@ -59,26 +48,9 @@ class Search:
             return int(collide_plan.MORE)
         return int(status)
 
-    def _make_room(self) -> None:
-        old = self.nodes.shape[1]
-        room = min(4 * old, self.most)
-        nodes, parent = np.empty((2, room, self.nodes.shape[2])), np.full((2, room), -1, np.int64)
-        domain = np.full((2, room), np.inf)
-        nodes[:, :old], parent[:, :old], domain[:, :old] = self.nodes, self.parent, self.domain
-        self.nodes, self.parent, self.domain = nodes, parent, domain
-
     def path(self) -> tuple[Array, int]:
         """The path through both trees once they meet, and the number of the goal that it reaches."""
-        halves = []
-        root = 0
-        for k in (0, 1):
-            row, rows = int(self.count[k]) - 1, []
-            while row >= 0:
-                rows.append(row)
-                root = row
-                row = int(self.parent[k, row])
-            halves.append(self.nodes[k, rows])
-        return np.concatenate([halves[0][::-1], halves[1][1:]]), root
+        return self._joined((int(self.count[0]) - 1, int(self.count[1]) - 1))
 
 
 def shortcut(model: CollisionModel, path: ArrayLike, *, rng: np.random.Generator, tries: int = SHORTCUTS) -> Array:
